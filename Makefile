@@ -24,7 +24,7 @@ rig: $(STAMP)  ## set up and drill wellbore 1
 
 test:  ## set up and run every check and every test, in parallel
 	$(MAKE) --jobs=6 --output-sync browser kernels bytecode lint contracts
-	$(MAKE) --jobs=2 types tests  # two compilers keep both cores busy before, and types wait for nobody
+	$(MAKE) --jobs=2 types tests  # the two compilers above keep both cores busy until here; types depend on neither
 
 quick: $(STAMP)  ## lint, types, contracts and the fast tests: under 90 s
 	$(MAKE) --jobs=4 check fast
@@ -61,7 +61,7 @@ bounds: $(STAMP)  ## the tests of the kernels with every index checked
 kernels: kernels-of-floats kernels-of-integers  ## compile what the tests would compile, each worker for itself
 
 # those in integers take longest and begin at once; what the others import is compiled once, before them
-kernels-of-floats: bytecode  ## those of a node, as it is and as published, of strings and of surveys
+kernels-of-floats: bytecode  ## those of a node, of the published form, of strings and of surveys
 	$(BIN)/python tests/tools/compile_kernels.py floats
 
 kernels-of-integers: $(STAMP)  ## those of a node in integers

@@ -25,11 +25,11 @@ import numpy as np
 from numba import njit
 
 from node.firmware.block_trial import record_of
-from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.arithmetic.formats import CYCLE_RATE_HZ, PERIOD
 from node.kernels.filter.float64.cycle import run_cycle
 from node.kernels.record.node_record import A_HOPS, A_SEQUENCE, A_SYSTEMATIC, A_VALID, A_YAW, A_YAW_VAR, READING
-from node.kernels.step.address import firmware
+from node.kernels.step.address import firmware_addresses
 from node.kernels.string.relay import offer_aiding
 from sim.campaign.chunk import RUNS, Campaign, run_chunk
 from sim.campaign.course import Course
@@ -98,7 +98,7 @@ def kernels(
             if tubes[hop].hop_loses:
                 break
             k = top - 1 - hop
-            offset = wrap(offset + (crews[k].drive_angle if hop == 0 else crews[k + 1].lower_angle))
+            offset = wrap_angle(offset + (crews[k].drive_angle if hop == 0 else crews[k + 1].lower_angle))
             systematic += crews[k].drive_var if hop == 0 else crews[k + 1].lower_var
             offer_aiding(
                 nodes[k].filter,
@@ -158,7 +158,7 @@ class OneRun:
         corrections = np.stack([np.concatenate([record_of(ParameterBlock(k + 1, 0))] * 2) for k in range(count)])
         taken = nodes, crews, corrections, self.course, self.noise, self.tubes(), self.draws, None, self.key
         kept = np.zeros(count * epochs, SURVEY), np.zeros((epochs, count), STATE_OF), np.zeros((count, CODES), np.int64)
-        return spent(lambda: drill(*firmware(), *taken, self.work, *kept)) / self.campaign.node_cycles
+        return spent(lambda: drill(*firmware_addresses(), *taken, self.work, *kept)) / self.campaign.node_cycles
 
     def with_columns(self) -> float:
         """Seconds of a node-cycle of a run from its draws to its columns."""

@@ -241,7 +241,7 @@ def children_s() -> float:
 
 
 def free_endpoint() -> str:
-    """An endpoint on loopback that nobody listens on."""
+    """Return an endpoint on loopback with a free TCP port."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"

@@ -26,12 +26,12 @@ import numpy as np
 from numba import njit
 
 from borechain.cli.faults import EnvironmentFault
-from node.firmware.encoder import EncoderNode, EncoderSample
+from node.firmware.encoder_node import EncoderNode, EncoderSample
 from node.kernels.arithmetic.angles import advance_binary, from_binary
 from node.kernels.arithmetic.formats import CYCLE_RATE_HZ, DEG, PERIOD
 from node.kernels.filter.float64.cycle import run_cycle
-from node.kernels.filter.float64.fixed_lag import aid
-from node.kernels.filter.float64.propagation import propagate
+from node.kernels.filter.float64.fixed_lag import apply_aiding
+from node.kernels.filter.float64.propagation import propagate_covariance
 from node.kernels.filter.float64.strapdown import rotate_down, yaw_rate
 from node.kernels.record.filter_record import CONFIG, STATE, STATES, default_config, new_state
 from node.kernels.string.relay import offer_aiding
@@ -279,9 +279,9 @@ def run_steps(begin: Any, state: Any, config: Any, inputs: Any, outputs: Any, pa
             wx, wy, wz = i.rate[0], i.rate[1], i.rate[2]
             rotate_down(own.down, wx, wy, wz, PERIOD)
             own.yaw = advance_binary(own.yaw, yaw_rate(own.down, wx, wy, wz) * PERIOD)
-            propagate(own.P, wz, PERIOD, 1.0, settings)
+            propagate_covariance(own.P, wz, PERIOD, 1.0, settings)
             var = i.yaw_var + settings.aiding_floor_var
-            out.status = aid(own, settings, from_binary(own.yaw), var, i.turn_rate, i.end)
+            out.status = apply_aiding(own, settings, from_binary(own.yaw), var, i.turn_rate, i.end)
             out.yaw = own.yaw
 
 

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from borechain.load.rounds import compare_rounds
-from node.kernels.step.warm import warm_up
+from node.kernels.step.precompile import warm_up
 from node.process.drivers.timed import TimedImu
-from node.process.host import run_node
+from node.process.node_host import run_node
 from sim.rig.realtime import clock_offset
 from sim.world.recording import record, turning_once
 from sim.world.world import World
@@ -91,7 +91,7 @@ def run() -> dict[str, Any]:
 
 
 def free_endpoint() -> str:
-    """An endpoint that nobody has."""
+    """Return an endpoint on loopback with a free TCP port."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
@@ -158,7 +158,7 @@ class Exchange:
             with contextlib.suppress(queue.Empty):
                 self.exchange(NUMBER, TURN)
                 return
-        raise RuntimeError(f"{self._keys}: nobody put on what was sent")
+        raise RuntimeError(f"{self._keys}: the message sent was not passed on")
 
     def exchange(self, length: int, patience: float = PATIENCE) -> float:
         """Time of ``length`` bytes there and back, s."""
@@ -173,7 +173,7 @@ class Exchange:
 
 
 class EncoderEnd:
-    """The encoder's end above the node, and whoever listens below it."""
+    """The encoder's end above the node, and the listener below it."""
 
     def __init__(self, bus: ZenohBus) -> None:
         medium = ZenohMedium(bus)

@@ -140,7 +140,7 @@ def joined(one: JointSeal, other: JointSeal) -> tuple[JointSeal, JointSeal]:
 
 
 def verify_times(folder: Path) -> dict[str, float]:
-    """Median time (us) of each cyclic message at whoever believes it: tube 1, of its state the base."""
+    """Median time (us) of verifying each cyclic message at its receiver: tube 1, or the base for a tube's state."""
     found = {}
     base, tube = opened(folder, BASE, [Side.LOWER]), opened(folder, 1, Side)
     encoder = opened(folder, ENCODER, Side)

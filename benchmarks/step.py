@@ -34,7 +34,7 @@ from node.kernels.record.node_record import (
     new_node,
 )
 from node.kernels.record.sensor_record import PARAMETERS
-from node.kernels.step.address import firmware
+from node.kernels.step.address import firmware_addresses
 from node.kernels.step.string_step import string_aiding, string_step
 from sim.studies.epochs import resting_string
 from sim.world.scenario import scenario_of
@@ -92,7 +92,7 @@ class String:
             )
             for k, one in enumerate(settings)
         ]
-        self.crews = np.concatenate([tube.crew for tube in self.tubes])
+        self.crews = np.concatenate([tube.settings_record for tube in self.tubes])
         self.places = np.arange(tubes)[::-1].copy()
 
 
@@ -126,7 +126,7 @@ def string_by_string(string: String, inputs: Inputs) -> Callable[[], None]:
     """A cycle of the whole string in one call from Python, as a study calls it."""
     tubes = len(string.tubes)
     mask, says = np.ones(tubes, np.bool_), np.zeros(tubes, np.int64)
-    step, aid = firmware()
+    step, aid = firmware_addresses()
 
     def run() -> None:
         nodes, crews = string.nodes, string.crews
@@ -172,7 +172,9 @@ def compiled(string: String, inputs: Inputs) -> Callable[[], None]:
 
     def run() -> None:
         tables = string.nodes, string.crews, string.corrections
-        all_cycles(*firmware(), *tables, inputs.readings, inputs.moments, inputs.aidings, string.places, *work)
+        all_cycles(
+            *firmware_addresses(), *tables, inputs.readings, inputs.moments, inputs.aidings, string.places, *work
+        )
 
     return run
 

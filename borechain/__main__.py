@@ -41,7 +41,7 @@ COMMANDS = {
     ),
     "allan": ("borechain.cli.calibrate.allan_command", "allan", "Noise of a sensor from a static record."),
     "survey": ("borechain.cli.survey.survey", "survey", "Trajectory and region of uncertainty of a record."),
-    "clearance": ("borechain.cli.survey.clearance_command", "clearance", "How far two holes keep from each other."),
+    "clearance": ("borechain.cli.survey.clearance_command", "clearance", "Clearance between two holes."),
     "wall": (
         "borechain.cli.survey.wall_command",
         "wall",

@@ -296,7 +296,7 @@ def query(selector: str, endpoint: str = keys.DEFAULT_ENDPOINT, timeout: float =
     Raises
     ------
     MediumError
-        When nobody answers within ``timeout`` (s), or the ground station refuses.
+        When no answer comes within ``timeout`` (s), or the ground station refuses.
     """
     from telemetry.media.zenoh_bus import open_client
 
@@ -304,6 +304,6 @@ def query(selector: str, endpoint: str = keys.DEFAULT_ENDPOINT, timeout: float =
         replies = bus.get(selector, timeout)
     answers = {reply.key: json.loads(reply.payload) for reply in replies if reply.error is None}
     if not answers:
-        reason = replies[0].error if replies else f"nobody answers at {endpoint}"
+        reason = replies[0].error if replies else f"no answer from {endpoint}"
         raise MediumError(f"{selector}: {reason}")
     return answers

@@ -12,7 +12,7 @@ Everything that docs/keys.md names can be asked with ``ask``; what most programs
 Errors::
 
     ClientError
-    ├── NoAnswerError(TimeoutError)   nobody answered in time: is the ground station running, is the rig's name right?
+    ├── NoAnswerError(TimeoutError)   no answer in time: is the ground station running, is the rig's name right?
     ├── RefusedError(ValueError)      the ground station said what is wrong with the question or the order
     └── AnswerError(ValueError)       the answer lacks something that this version knows: the two do not fit
 """
@@ -44,7 +44,7 @@ class ClientError(BorechainError):
 
 
 class NoAnswerError(ClientError, TimeoutError):
-    """Nobody answered in time."""
+    """No answer came in time."""
 
 
 class RefusedError(ClientError, ValueError):
@@ -273,7 +273,7 @@ def live_rigs(bus: ZenohBus, timeout: float = 1.0) -> list[str]:
 
 
 def who_is_there(bus: ZenohBus) -> str:
-    """Which rigs could have been meant, for a line to whoever named another."""
+    """Line that lists the rigs with a ground station, for the error on an unknown rig."""
     rigs = live_rigs(bus)
     return f"rigs with a ground station: {', '.join(rigs)}" if rigs else "no rig has a ground station here"
 

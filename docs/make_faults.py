@@ -18,12 +18,17 @@ from sim.gauntlet.fault_kinds import ANSWERS, KINDS, FaultKind  # noqa: E402
 SEEDS = 4
 PAGE = """# Faults
 
-Each kind of fault of `borechain gauntlet` by itself, {seeds} seeds a kind, on a string of two tubes that drills and is
-surveyed once by each tube: what happens, what the system does, how many of the two surveys are in the trajectory at the
-end (three where a tube took a fault for a motion), which alarms the crew saw after the fault began and within what time
-at the latest ([what they mean](operate.md#what-the-crew-is-told), looked at every {every:.0f} s), and within what time
-all that can be repaired is, and what was lost is told. A kind without an alarm was borne by repetition. Made by
-`python docs/make_faults.py`.
+Each kind of fault of `borechain gauntlet` by itself, {seeds} seeds a kind, on a string of two tubes that drills and
+takes one survey with each tube. The columns:
+
+* what happens, and what the system does;
+* surveys in the trajectory at the end, a seed each: two are due; a tube that takes a fault for a motion adds one;
+* alarms that the crew saw after the fault began, and the latest time of each
+  ([what they mean](operate.md#what-the-crew-is-told), looked at every {every:.0f} s); a kind without an alarm is made
+  good by repetition;
+* the time within which everything that can be repaired is, and the crew knows what was lost.
+
+Made by `python docs/make_faults.py`.
 
 {table}"""
 

@@ -69,7 +69,7 @@ async def live(
 
 
 def take_pictures(url: str) -> None:
-    """One picture after the other; on the first somebody acknowledges the alarms and has a tube survey again."""
+    """Take one picture after the other; on the first, the alarms are acknowledged and a tube surveys again."""
     with sync_playwright() as driver, driver.chromium.launch(executable_path=find_browser(), args=FLAGS) as browser:
         for name, options in PICTURES.items():
             page = browser.new_page(**options)

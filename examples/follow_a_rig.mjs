@@ -39,7 +39,7 @@ async function* changes(address, silenceMs) {
 async function within(ms, promise) {
   let timer;
   const late = new Promise((done) => { timer = setTimeout(done, ms); });
-  promise.catch(() => {}); // what comes after the end is nobody's business
+  promise.catch(() => {}); // what comes after the end is ignored
   try {
     return await Promise.race([promise, late]);
   } finally {

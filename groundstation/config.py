@@ -16,7 +16,7 @@ from groundstation.survey.fusion.resolve import Direction, known_direction
 from groundstation.survey.wall.column_deviation import PRESETS, ColumnDesign
 from telemetry import keys
 
-SENSOR_BIAS_DEG = 0.06  # of an accelerometer, as a tilt: 1 mg, of one that nobody has calibrated
+SENSOR_BIAS_DEG = 0.06  # of an uncalibrated accelerometer, as a tilt: 1 mg
 Positive = Annotated[float, Field(gt=0.0)]
 
 

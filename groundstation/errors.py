@@ -5,7 +5,7 @@
     GroundError
     ├── SurveyError(InputError, ValueError)    invalid survey numbers: which file and line, value, station
     ├── ToolError(InputError, ValueError)      an instrument model that cannot be used: which file, term and formula
-    ├── SelectorError(ValueError)              a query nobody can answer: the message lists the valid names
+    ├── SelectorError(ValueError)              a query without an answer: the message lists the valid names
     ├── ConfigurationError(InputError, ValueError)    a setting that what was asked for needs: correct the option named
     ├── LeaseError(OSError)                    another ground station works on the rig: end it, or name another rig
     ├── PageError(OSError)                     the page cannot be served: choose another address
@@ -22,7 +22,7 @@ class GroundError(BorechainError):
 
 
 class SurveyError(GroundError, InputError, ValueError):
-    """The numbers given are no survey."""
+    """The numbers given are not a valid survey."""
 
 
 class ToolError(GroundError, InputError, ValueError):

@@ -68,16 +68,16 @@ def run_ground(
 def load_kernels() -> None:
     """Compile what surveys are computed with, or load it, before it says that it lives: no question waits for that."""
     from groundstation.survey.well.kernels.position_errors import warm_up
-    from node.kernels.arithmetic.jit import leave_blas_out
+    from node.kernels.arithmetic.compiler import leave_blas_out
 
     leave_blas_out()
     warm_up()
 
 
 def started(config: GroundConfig) -> GroundProcess:
-    """A ground station that has worked out what it knows, and the longest answer once: nobody's first question waits.
+    """Return a ground station with everything computed and the longest answer made once, so that no first query waits.
 
-    Nor does any for a look for garbage through what was imported and restored, 0.1 s of ten thousand surveys.
+    Nor does one wait for a garbage collection over what was imported and restored (0.1 s of ten thousand surveys).
     """
     process = GroundProcess(config)
     process.operator.ask_json("measurements")
@@ -142,7 +142,7 @@ def page_of(page: PageSettings | None) -> Iterator[ServePage]:
 
 
 def end_with(answers: asyncio.Task[None], stop: Callable[[], None]) -> None:
-    """Have ``stop`` called by signals, and when nobody is answered any more: a launcher then starts anew."""
+    """Have ``stop`` called by signals, and when the task that answers ends: a launcher then starts the process anew."""
     stop_on_signals(stop)
     answers.add_done_callback(lambda _task: stop())
 

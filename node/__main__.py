@@ -12,7 +12,7 @@ PROGRAM = "python -m node"
 def main() -> None:
     """Run the command: ``node`` (the default) or ``encoder``."""
     try:
-        from node.process.commands import commands
+        from node.process.command_group import commands
         from telemetry.runtime.command_line import run_command
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "telemetry":

@@ -17,12 +17,12 @@ class NodeError(BorechainError):
     """Root of every error of this package."""
 
 
-class ConfigurationError(NodeError, InputError, ValueError):
+class NodeConfigurationError(NodeError, InputError, ValueError):
     """A setting is outside its range."""
 
 
 class SavedStateError(NodeError, ValueError):
-    """The bytes are no saved state of this layout."""
+    """The bytes are not a saved state of this layout."""
 
 
 class SensorError(NodeError, OSError):

@@ -35,7 +35,7 @@ COUNT = -1  # in a shape: as many powers as were fitted
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Provenance:
-    """Where a block comes from; the standard errors are shaped like the parameters they belong to.
+    """Origin of a block; the standard errors are shaped like the parameters they belong to.
 
     ``input_sha256`` of the record, ``day`` in ISO 8601, ``design`` in words, ``residual_rms`` in the readings' unit.
     """
@@ -183,7 +183,7 @@ def check_invertible(matrix: Array) -> None:
 
 
 def sensor_parameters(calibration: Calibration) -> SensorParameters:
-    """What a node applies of a calibration.
+    """Return the parameters that a node applies of a calibration.
 
     Raises
     ------
@@ -243,7 +243,7 @@ def _freeze(owner: object, name: str, shape: tuple[int, ...]) -> Array:
 
 
 def _plain(owner: Calibration | Provenance) -> dict[str, Any]:
-    """A block as JSON knows it."""
+    """Return a block as a JSON object."""
     plain: dict[str, Any] = {}
     for field in fields(owner):
         value = getattr(owner, field.name)

@@ -9,7 +9,7 @@
     TelemetryError
     ├── MediumError(OSError)          the bus could not be opened or was lost: retry or reconfigure
     │   └── UnknownMediumError(ValueError)  no medium of that name: correct the configuration
-    ├── DecodeError(ValueError)       bytes that are no message of ours; the link counts and drops them
+    ├── DecodeError(ValueError)       bytes that are not a message; the link counts and drops them
     ├── EncodeError(ValueError)       a message outside its declared range: nothing was sent
     ├── CommandError(ValueError)      an order outside the table of commands: nothing was sent
     ├── KeyFileError(ValueError)      the key of the rig is missing, open to others or none: correct the file

@@ -98,12 +98,12 @@ TABLE: Final[tuple[Key, ...]] = (
     Key(
         INTAKE,
         "query, publish",
-        "everything that the ground station takes in, where somebody listens: for recordings (msgpack); ?since=17",
+        "everything that the ground station takes in, where there is a listener: for recordings (msgpack); ?since=17",
     ),
     Key(
         "borechain/{rig}/ground/changes",
         "query, publish",
-        "when each answer changed last: a listener that a full line has cost one sees it and asks",
+        "when each answer changed last: a listener that lost one to a full line sees it and asks again",
     ),
     Key("borechain/{rig}/ground/schema", "query", "JSON schema of every answer below ground/"),
     Key("borechain/{rig}/ground/recalibration", "query, publish", "calibration in the field: progress and result"),
@@ -114,7 +114,7 @@ TABLE: Final[tuple[Key, ...]] = (
 
 
 def is_order(selector: str) -> bool:
-    """Whether a selector orders something of the ground station."""
+    """Return whether a selector is an order to the ground station."""
     return selector.split("?", maxsplit=1)[0].split("/")[2:3] == ["cmd"]
 
 

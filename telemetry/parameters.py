@@ -75,7 +75,7 @@ def unpack_block(data: bytes) -> ParameterBlock:
     Raises
     ------
     DecodeError
-        When the bytes are no block of this format or hold a number that is not finite.
+        When the bytes are not a block of this format, or hold a number that is not finite.
     """
     if len(data) != BLOCK_SIZE:
         raise DecodeError(f"parameter block: expected {BLOCK_SIZE} bytes, got {len(data)}")

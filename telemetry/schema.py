@@ -126,7 +126,7 @@ def _time(name: str, key: str, meaning: str) -> Field:
 
 
 def _margin(name: str, key: str, where: str) -> Field:
-    meaning = f"of the frames from {where} over the radio's threshold; inf without a radio, or with nobody heard"
+    meaning = f"of the frames from {where} over the radio's threshold; inf without a radio, or with none heard"
     return Field(name, ValueKind.NUMBER, meaning, "dB", -200.0, math.inf, key=key, since=4, before=math.inf, step=0.5)
 
 

@@ -1,4 +1,4 @@
-"""What is written as bytes only where somebody needs them: on the native profile of CAN nobody does."""
+"""Payloads and frames that become bytes only where these are needed: never on the native profile of CAN."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 
 
 class Unwritten(ABC):
-    """Something to say that knows its parts; its bytes are made once, when they are asked for."""
+    """A payload or frame that knows its parts; its bytes are made once, on demand."""
 
     __slots__ = ("_written",)
     _written: bytes | None  # None at first
@@ -14,16 +14,16 @@ class Unwritten(ABC):
     @property
     @abstractmethod
     def most(self) -> int:
-        """Bytes that it takes at most, so that a queue need not have it written to know that it has room."""
+        """Largest size (bytes), for a queue to know whether it has room without the bytes."""
 
     def __bytes__(self) -> bytes:
-        """Its bytes."""
+        """Return the bytes."""
         if self._written is None:
             self._written = self._write()
         return self._written
 
     def __len__(self) -> int:
-        """How many bytes."""
+        """Number of bytes."""
         return len(bytes(self))
 
     @abstractmethod

@@ -33,7 +33,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 
 MEMORY, ROOM = Path("/dev/shm"), 1 << 30  # bytes; a whole run leaves some 50 MB
 if os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free > ROOM:
-    # a third of the time went by waiting for a disk to sync what nobody will read after a power cut
+    # a third of the time went by waiting for a disk to sync what will not be read after a power cut
     os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY))
 
 # the collector looks through all that lives whenever enough was made anew: modules and tests live to the end, so it
@@ -84,7 +84,7 @@ def pytest_collection_finish() -> None:
 def dealt(items: Sequence[pytest.Item], workers: int, cores: int = os.cpu_count() or 1) -> list[pytest.Item]:
     """Tests in such an order that a worker a core computes while the others wait for processes, from the first test on.
 
-    xdist cuts the list into equal parts, a worker each, and whoever has done his takes from the end of another's. So
+    xdist cuts the list into equal parts, a worker each, and a worker that is done takes from the end of another's. So
     what waits stands at the beginning of all parts but the last ones. Where every worker began with some of it, half
     of the machine was idle for four minutes of six; where it stood last, one worker waited for rig after rig.
     """

@@ -30,7 +30,7 @@ from pathlib import Path
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
 from groundstation.service.process.ground_process import GroundProcess
-from node.firmware.settings import TubeSettings
+from node.firmware.tube_settings import TubeSettings
 from node.process.tube_process import TubeProcess
 folder = Path(sys.argv[1])
 ground = GroundProcess(GroundConfig(folder=folder / "ground"))

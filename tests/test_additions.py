@@ -71,9 +71,8 @@ STUDY = Addition(
             "coin",
             "Whether a coin is fair.",
             f"{MODULES}.coin",
-            (Table("{throws} throws", (("case", "case"), ("ours", "ours")), (("case", "case"), ("ours", "ours"))),),
-            (Option("throws", 4, 1, 10),),
-            drawn=False,
+            (ResultTable("{throws} throws", (("case", "case"), ("ours", "ours")), (("case", "case"), ("ours",
+            "ours"))),), (Option("throws", 4, 1, 10),), drawn=False,
         ),
 """,
     files={
@@ -160,7 +159,7 @@ def test_the_guide_names_the_files(addition: Addition) -> None:
 def test_a_tube_obeys_an_added_command_and_its_ranges_hold(copy: Path) -> None:
     out = run(copy, "-c", program("""
         import pathlib, sys, tempfile
-        from node.firmware.settings import TubeSettings
+        from node.firmware.tube_settings import TubeSettings
         from node.process.command_handlers import CommandHandlers
         from node.process.tube_process import TubeProcess
         from telemetry.application.arguments import parse_parameters
@@ -185,7 +184,7 @@ def test_a_tube_obeys_an_added_command_and_its_ranges_hold(copy: Path) -> None:
 
 def test_frames_cross_an_added_medium(copy: Path) -> None:
     out = run(copy, "-c", program("""
-        from telemetry.media.port import Frame, TubeEnd
+        from telemetry.media.port import PortFrame, TubeEnd
         from telemetry.media.media_table import open_medium
         from telemetry.messages import Side
 
@@ -193,7 +192,7 @@ def test_frames_cross_an_added_medium(copy: Path) -> None:
             lower_end = TubeEnd("rig", 2, Side.LOWER, 1)
             upper, lower = medium.open_port(lower_end), medium.open_port(lower_end.facing)
             lower.listen(print)
-            upper.send(Frame(b"hello"))
+            upper.send(PortFrame(b"hello"))
             upper.close()
             lower.close()
     """))  # fmt: skip

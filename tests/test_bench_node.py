@@ -18,7 +18,7 @@ from click.testing import CliRunner
 
 from borechain.cli.bench.bench import bench
 from borechain.cli.faults import EnvironmentFault
-from node.kernels.record.filter_record import Status, default_config, new_state
+from node.kernels.record.filter_record import CycleStatus, default_config, new_state
 
 pytestmark = pytest.mark.slow
 
@@ -72,7 +72,7 @@ def assert_same(node: ModuleType, in_c: Any, inputs: Any, config: Any, state: An
         elif name in BETWEEN_CYCLES:
             scale = max(float(np.abs(ours_is).max()), 1e-3 if name == "stamp" else 1e-6)
             np.testing.assert_allclose(ours_is, theirs_is, rtol=0.0, atol=relative * scale, err_msg=name)
-    return Status(int(np.bitwise_or.reduce(our_out["status"])))
+    return CycleStatus(int(np.bitwise_or.reduce(our_out["status"])))
 
 
 @needs_compiler
@@ -80,8 +80,14 @@ def test_c_and_ours_agree_over_the_whole_bore(node: ModuleType, in_c: Any, recor
     config = default_config()
     seen = assert_same(node, in_c, recording, config, new_state(config))
     assert len(recording) > 3000
-    everyday = Status.BIAS_KNOWN | Status.STARTED | Status.STOPPED | Status.SURVEY_READY | Status.AIDED
-    joints = Status.JOINT_OPENED | Status.JOINT_CLOSED | Status.REFERENCE_CHANGED
+    everyday = (
+        CycleStatus.BIAS_KNOWN
+        | CycleStatus.STARTED
+        | CycleStatus.STOPPED
+        | CycleStatus.SURVEY_READY
+        | CycleStatus.AIDED
+    )
+    joints = CycleStatus.JOINT_OPENED | CycleStatus.JOINT_CLOSED | CycleStatus.REFERENCE_CHANGED
     assert everyday | joints in seen
 
 
@@ -113,8 +119,11 @@ def test_they_agree_when_things_go_wrong(node: ModuleType, in_c: Any, recording:
     for name, value in change.items():
         config[name] = value
     seen = assert_same(node, in_c, troubled(recording), config, new_state(config))
-    assert Status.BAD_SAMPLE | Status.RATE_EXCEEDED | Status.RATE_RECOVERED | Status.LATE_DROPPED in seen
-    assert Status.REJECTED | Status.YAW_RESET in seen
+    assert (
+        CycleStatus.BAD_SAMPLE | CycleStatus.RATE_EXCEEDED | CycleStatus.RATE_RECOVERED | CycleStatus.LATE_DROPPED
+        in seen
+    )
+    assert CycleStatus.REJECTED | CycleStatus.YAW_RESET in seen
 
 
 @needs_compiler
@@ -122,7 +131,7 @@ def test_both_see_a_broken_covariance(node: ModuleType, in_c: Any, recording: An
     config = default_config()
     state = new_state(config)
     state["P"][0, 2, 2] = -1.0
-    assert Status.FILTER_FAULT in assert_same(node, in_c, recording[:3], config, state)
+    assert CycleStatus.FILTER_FAULT in assert_same(node, in_c, recording[:3], config, state)
 
 
 @needs_compiler
@@ -142,7 +151,7 @@ def test_fixed_point_is_measured_on_the_same_recording(node: ModuleType, recordi
     fixed = node.FixedStretch(stretch)
     stretch.seconds(node.run_compiled)
     fixed.seconds(run_fixed)
-    known = np.maximum.accumulate(stretch.outputs["status"] & Status.AIDED) > 0
+    known = np.maximum.accumulate(stretch.outputs["status"] & CycleStatus.AIDED) > 0
     off = (fixed.outputs["yaw"] - stretch.outputs["yaw"]).astype(np.int32)[known] * COUNT
     assert np.abs(off).max() < np.radians(0.03)
 

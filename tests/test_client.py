@@ -134,7 +134,7 @@ def test_the_example_in_javascript_runs_in_node(served: Served) -> None:
     ]  # fmt: skip
     assert served.rig.ask("verdict")["line"] in lines
     assert any(line.startswith("alarm ") and "projection" in line for line in lines)
-    nobody = subprocess.run(
+    unanswered = subprocess.run(
         [NODE, EXAMPLES / "follow_a_rig.mjs", f"http://127.0.0.1:{free_port()}"], capture_output=True, check=False
     )
-    assert nobody.returncode == 1
+    assert unanswered.returncode == 1

@@ -44,7 +44,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 
 def shown(app: CrewApp) -> list[str]:
-    """The lines on the screen as somebody reads them, cut where the screen is."""
+    """The lines on the screen as a reader sees them, cut where the screen is."""
     rows: dict[float, str] = {}
     for y, text in re.findall(r'<text[^>]* y="([0-9.]+)"[^>]*clip-path[^>]*>(.*?)</text>', app.export_screenshot()):
         rows[float(y)] = rows.get(float(y), "") + html.unescape(text).replace("\xa0", " ")
@@ -118,7 +118,7 @@ class Lossy:
 
 
 async def test_what_the_bus_has_dropped_is_asked_for(tmp_path: Path) -> None:
-    """An alarm that somebody acknowledged is shown so, though no word of it arrived."""
+    """An alarm that was acknowledged is shown so, though no word of it arrived."""
     rig = Rig(tmp_path, target=20.0)
     for stop in range(1, 4):
         rig.drill(stop, 0.3)

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from borechain.__main__ import cli
-from node.process.commands import commands
+from node.process.command_group import commands
 from sim.studies.study_table import STUDIES
 
 ROOT = Path(__file__).parents[1]
@@ -192,3 +192,50 @@ def test_a_command_is_options_one_call_and_print() -> None:
         if lines > MOST_LINES or taken > MOST_PARAMETERS:
             large.append(f"{function.__module__}.{function.__name__}: {taken} parameters, {lines} lines")
     assert large == []
+
+
+ODD = re.compile(
+    r"(?i:\b(whoever|nobody|somebody|whence|thereof|as nearly always|who asks)\b|is no (number|time|measurement)\b)"
+    r"|\b[Tt]hat is none\b"
+)
+ROOMS = (
+    *("benchmarks", "borechain", "deploy", "docs", "examples", "groundstation", "node", "scenarios"),
+    *("sim", "telemetry", "tests", ".ci"),
+)
+SUFFIXES = (
+    *("", ".c", ".css", ".csv", ".dbc", ".h", ".html", ".js", ".json", ".md", ".mjs", ".py", ".service"),
+    *(".sh", ".svg", ".toml", ".txt", ".typ", ".yaml", ".yml"),
+)
+EXCUSED = {  # file or folder: why the phrases stand there
+    "LICENSE": "the words of the licence",
+    "CONTRIBUTING.md": "quotes one as the example of what not to write",
+    "tests/test_habits.py": "lists them",
+    "tests/tools/postgres.py": "the name of a user of the operating system",
+    "node/kernels": "a changed line there compiles every kernel anew; they go with the next change of the kernels",
+}
+
+
+def texts() -> list[Path]:
+    """Files of the project that people write or read, relative to its root."""
+    files = [*ROOT.glob("*"), *(path for room in ROOMS for path in (ROOT / room).rglob("*"))]
+    return sorted(path.relative_to(ROOT) for path in files if path.is_file() and path.suffix in SUFFIXES)
+
+
+def odd_lines(path: Path) -> list[str]:
+    """Lines of a file with a phrase that a stranger stumbles over, as path, number and line."""
+    lines = (ROOT / path).read_text(encoding="utf-8", errors="replace").splitlines()
+    return [f"{path.as_posix()}:{number}: {line.strip()}" for number, line in enumerate(lines, 1) if ODD.search(line)]
+
+
+def is_excused(path: Path) -> bool:
+    return any(path == Path(name) or Path(name) in path.parents for name in EXCUSED)
+
+
+def test_no_text_speaks_of_whoever_and_nobody() -> None:
+    """Subject, verb, object and the field's words: say which process, reader or crew, and which value is invalid."""
+    assert [line for path in texts() if not is_excused(path) for line in odd_lines(path)] == []
+
+
+@pytest.mark.parametrize("name", EXCUSED)
+def test_an_excuse_that_is_no_longer_needed_goes(name: str) -> None:
+    assert [line for path in texts() if path == Path(name) or Path(name) in path.parents for line in odd_lines(path)]

@@ -15,6 +15,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tomllib
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -37,7 +38,7 @@ OURS = ("borechain", "groundstation", "node", "sim", "telemetry")
 RECORD = str(ROOT / "scenarios" / "wellbore-1-path.csv")
 TURN_TABLE = str(ROOT / "tests" / "data" / "calibration" / "calibration_node_a1_gyro.csv")
 NEEDS = re.compile(r"Error: needs the extra (\w+): pip install 'borechain\[(\w+)\]' \(\w+ is not installed\)\n")
-# a command that connects is given an endpoint where nobody listens: it has passed every check of its options then
+# a command that connects is given an endpoint without a listener: it has passed every check of its options then
 NOWHERE = ("--endpoint", "tcp/127.0.0.1:1")
 WALK = """
 import contextlib, io, click
@@ -205,7 +206,7 @@ def test_every_command_helps_and_does_its_job_or_names_the_extra_it_needs(
     else:
         assert NEEDS.fullmatch(environment.run(program=("-m", "groundstation")).stderr)
     overwritten = environment.site / "node" / "__init__.py"
-    overwritten.write_text('"""Somebody else\'s, installed over ours."""\n')
+    overwritten.write_text('"""A foreign one, installed over ours."""\n')
     refused = environment.run("router")
     assert (refused.returncode, len(refused.stderr.splitlines())) == (1, 1)
     assert str(overwritten) in refused.stderr
@@ -262,13 +263,33 @@ def test_a_board_runs_its_node_without_the_other_packages(board: Environment) ->
 def test_a_package_of_somebody_else_is_named_with_its_place(tmp_path: Path, name: str) -> None:
     foreign = tmp_path / "foreign" / name / "__init__.py"
     foreign.parent.mkdir(parents=True)
-    foreign.write_text('"""Somebody else\'s."""\n')
+    foreign.write_text('"""A foreign one."""\n')
     path = [str(foreign.parents[1]), str(ROOT)]
     program = f"import sys; sys.path[:0] = {path}; from borechain.__main__ import main; main(['router'])"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 1
     assert len(done.stderr.splitlines()) == 1
     assert str(foreign) in done.stderr
+
+
+def test_the_lowest_numba_allowed_does_what_the_kernels_lean_on(tmp_path: Path) -> None:
+    """Of numba's private modules, see ``node.kernels.arithmetic.compiler``; no later one may be the first to do it."""
+    asked = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
+    lowest = {needed.name: str(needed.specifier).removeprefix(">=") for needed in map(Requirement, asked)}
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path / "venv"], check=True)
+    made = Environment(tmp_path / "venv" / "bin" / "python", tmp_path)
+    done = pip(made.python, "--only-binary", ":all:", f"numba=={lowest['numba']}", f"numpy>={lowest['numpy']}")
+    if done.returncode:
+        pytest.skip(f"numba {lowest['numba']}: the index has no wheel of it: {done.stderr.strip().splitlines()[-1]}")
+    for distribution in closure(["pytest"], "", {}).values():
+        for top in {file.parts[0] for file in distribution.files or ()} - {"..", "__pycache__"}:
+            (made.site / top).symlink_to(Path(str(distribution.locate_file(top))))
+    options = ("--noconftest", "-c", os.devnull, "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestWarning")
+    tests = ROOT / "tests" / "node" / "test_compiler.py"
+    program = f"import sys; sys.path.insert(0, {str(ROOT)!r}); import numba, pytest; print(numba.__version__); "
+    program += f"sys.exit(pytest.main({[*options, str(tests)]!r}))"
+    done = made.run("-c", program, program=())
+    assert (done.returncode, done.stdout.splitlines()[0]) == (0, lowest["numba"]), done.stdout
 
 
 @pytest.mark.parametrize("version", ["3.12", "3.13"])

@@ -36,14 +36,14 @@ def test_documented_keys_are_the_table_of_the_code() -> None:
 
 def test_every_equation_named_in_a_kernel_is_in_the_document() -> None:
     text = (ROOT / "docs" / "equations.md").read_text()
-    listed = set(re.findall(r"`((?:node\.kernels|groundstation\.survey)\.[a-z0-9_.]+)`", text))
+    listed = set(re.findall(r"`((?:node\.kernels|groundstation\.survey|sim\.studies)\.[a-z0-9_.]+)`", text))
     for name in listed:
         module, _, function = name.rpartition(".")
         assert hasattr(importlib.import_module(module), function), name
     assert {
         "node.kernels.filter.float64.strapdown.yaw_rate",
-        "node.kernels.filter.float64.propagation.propagate",
-        "node.kernels.filter.float64.update.joseph",
+        "node.kernels.filter.float64.propagation.propagate_covariance",
+        "node.kernels.filter.float64.update.joseph_update",
     } <= listed
 
 

@@ -109,7 +109,7 @@ def test_the_step_is_told_in_its_order() -> None:
         for name in cell.split("`")[1::2]
     ]
     whole = source_of("node_step")
-    for name in ("step_around", "enter", "before_loop", "leave", "after_loop"):
+    for name in ("step_around", "begin_step", "before_loop", "end_step", "after_loop", "conclude_cycle"):
         whole = whole.replace(f"{name}(", source_of(name) + "(", 1)
     places = [whole.find(f"{name}(") for name in named]
     assert len(named) == 10

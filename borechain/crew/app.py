@@ -190,7 +190,7 @@ class CrewApp(App[None]):
         self.paint()
 
     def _ask_all(self) -> None:
-        """What is not published by itself at once, asked for at the beginning; nobody there is no fault."""
+        """Ask at the beginning for what is not published at once; no answer is no fault."""
         self._ask_for([*PATHS, *(f"nodes/{row['tube']}" for row in self._ask("string").get("tubes", []))])
 
     def _ask_for(self, paths: Sequence[str]) -> None:

@@ -109,7 +109,7 @@ class Picture:
 
 
 def is_outdated(known: View | None, told: View, changed_at: int) -> bool:
-    """Whether an answer is of before its path changed, or of a former start of the ground station."""
+    """Whether an answer is older than the last change of its path, or of an earlier start of the ground station."""
     if known is None or known["revision"] < changed_at:
         return True
     return bool(known["revision"] > told["revision"] and known["utc"] < told["utc"])

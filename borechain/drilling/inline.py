@@ -1,7 +1,7 @@
 """A whole rig inside this process: firmware, links and ground station as objects, stepped by the scheduler.
 
 Everything that a rig of processes runs is here but the bus and the operating system's processes. The digest is the
-same, bit for bit, at a fraction of the CPU time; nobody can ask it while it runs.
+same, bit for bit, at a fraction of the CPU time; no query is answered while it runs.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from borechain.drilling.rig_host import depth_sealer
 from groundstation.config import GroundConfig
 from groundstation.service.process.ground_process import GroundProcess
 from node.process.encoder_process import EncoderProcess
-from node.process.host import seals_at
+from node.process.node_host import seals_at
 from node.process.tube_process import TubeProcess
 from sim.errors import RigError
 from sim.rig.in_process import Build, InProcessStepper, unwritten

@@ -6,13 +6,13 @@ import gc
 
 import borechain.drilling.rig_host
 import groundstation.host
-import node.process.host
+import node.process.node_host
 import sim.rig.bus_stepper
 import sim.rig.scheduler
 import sim.world.world
 from groundstation.survey.well.kernels import position_errors
-from node.kernels.arithmetic.jit import leave_blas_out
-from node.kernels.step.warm import warm_encoder, warm_up
+from node.kernels.arithmetic.compiler import leave_blas_out
+from node.kernels.step.precompile import warm_encoder, warm_up
 
 leave_blas_out()
 warm_up()

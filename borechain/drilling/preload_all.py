@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from borechain.drilling import preload
 from node.firmware.kernel_choice import kernel_of
-from node.firmware.settings import KERNELS
-from node.kernels.step.warm import warm_step
+from node.firmware.tube_settings import KERNELS
+from node.kernels.step.precompile import warm_step
 
 for kernel in KERNELS:
     loop = kernel_of(kernel)

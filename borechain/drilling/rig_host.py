@@ -38,9 +38,9 @@ def run_medium(
 ) -> None:
     """World, joints and clock; in a rig without an outside router its session is the router.
 
-    ``cued`` says that a launcher has started all processes and plays the operator; without one, whoever has not joined
-    is waited for: nobody knows how long it compiles. ``transports`` says which joints are not on zenoh, ``hole`` which
-    one of the scenario's site is drilled.
+    ``cued`` says that a launcher has started all processes and plays the operator; without one, the rig waits for every
+    process to join, since compiling takes an unknown time. ``transports`` says which joints are not on zenoh, ``hole``
+    which one of the scenario's site is drilled.
     """
     from sim.rig.bus_stepper import BusStepper
     from sim.rig.scheduler import Progress, Scheduler
@@ -52,7 +52,7 @@ def run_medium(
     with reporting_errors("medium"):
         seal_depth = depth_sealer(place.keys)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PorosityWarning)  # whoever started the rig was warned
+            warnings.simplefilter("ignore", PorosityWarning)  # the user was warned at the start of the rig
             found = load_scenario(scenario, faults)
             world = World(found.drilling(hole) if hole else found, seed)
         if router:
@@ -77,7 +77,7 @@ def run_medium(
 
 
 def say_absent(name: str, waited: float) -> None:
-    """Say now and then who has not joined the rig (wall s)."""
+    """Report now and then which processes have not joined the rig (wall s)."""
     if waited > 0.0 and waited % SAY_EVERY == 0.0:
         sys.stderr.write(f"borechain medium: {name} has not joined for {waited:.0f} s, it is waited for\n")
         sys.stderr.flush()

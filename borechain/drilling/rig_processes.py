@@ -13,7 +13,7 @@ from borechain.drilling.rig_host import run_medium
 from borechain.drilling.rig_job import RigJob, RigRun, ShowProgress
 from groundstation.gateway.page.settings import PageSettings
 from groundstation.host import run_ground
-from node.process.host import run_encoder, run_node
+from node.process.node_host import run_encoder, run_node
 from sim.rig.ground_answers import ask_surveys, get_json, selector_of
 from sim.rig.ground_settings import ground_settings
 from sim.rig.launcher import Launcher, Tick, private_folder
@@ -27,11 +27,7 @@ from telemetry.messages import BASE, ENCODER
 from telemetry.runtime.hosting import Place
 from telemetry.transport.authentication import new_key
 
-PRELOAD = {
-    "float64": "borechain.drilling.preload",
-    "fixed": "borechain.drilling.preload_all",
-    "published": "borechain.drilling.preload_all",
-}  # by kernel
+PRELOAD = {"float64": "borechain.drilling.preload", "fixed": "borechain.drilling.preload_all"}  # by kernel
 
 
 def drill_in_processes(

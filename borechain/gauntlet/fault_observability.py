@@ -2,7 +2,7 @@
 
 That the encoder slipped shows only against a gyroscope that ran through it. Where three faults or more leave none, a
 slip is a turn of the string to everything that measures, and no alarm can be asked for. A depth that is wrong shows
-against one that was known before: not to a ground station that starts then upon a database that somebody took back.
+against one that was known before: not to a ground station that starts then with a database restored from a backup.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class FaultObservability:
         rig.before_cut.append(self._note_rests)
 
     def note(self) -> None:
-        """Look at the rig now."""
+        """Note the present state of the rig."""
         self._log.append((self._rig.now, frozenset(tube for tube in TUBES if self._sees(tube))))
         if self._shown() != self._encoder:
             self._encoder = self._shown()
@@ -74,7 +74,7 @@ class FaultObservability:
         return bool(frozenset(TUBES).intersection(*self._seeing(at - AROUND, at + AROUND)))
 
     def _seeing(self, begin: float, end: float) -> Iterator[frozenset[int]]:
-        """Tubes that saw, of every part of a time (s)."""
+        """Tubes that observed the encoder in each part of an interval (s)."""
         ends = [since for since, _ in self._log[1:]] + [self._rig.now]
         for (since, tubes), until in zip(self._log, ends, strict=True):
             if since < end and until > begin:

@@ -29,7 +29,7 @@ RESTED = 100.0  # s that the string of a short schedule has rested and been hear
 
 
 class Plan(NamedTuple):
-    """A schedule, and from when on faults may begin in it.
+    """A schedule, and the time (s) from which faults may begin in it.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class GauntletRig:
         return process if isinstance(process, GroundProcess) else None
 
     def cut(self, address: int) -> None:
-        """Power off; nothing where it is off already."""
+        """Cut the power of a process, if it has any."""
         if address not in self.scheduler.progress.wanted:
             return
         for listener in self.before_cut:
@@ -118,7 +118,7 @@ class GauntletRig:
         return self.now - self._spoke_until.get(tube, math.inf)
 
     def start(self, address: int, tube: int | None = None) -> None:
-        """Power on, where it was cut."""
+        """Power a process on if it was cut."""
         if address not in self.off:
             return
         del self.off[address]
@@ -127,34 +127,34 @@ class GauntletRig:
         self.stepper.follow(self.scheduler.progress)
 
     def begin(self, at: float) -> None:
-        """Power for everything at a rig time (s)."""
+        """Power everything on at a rig time (s)."""
         self._look_at = at + LOOK_EVERY
         self.scheduler.begin(at)
 
     def freeze(self, address: int) -> None:
-        """A process gets no events."""
+        """Freeze a process: it gets no events."""
         self.stepper.freeze(address)
 
     def thaw(self, address: int) -> None:
-        """It goes on."""
+        """Thaw a process."""
         self.stepper.thaw(address)
 
     def disk(self, address: int) -> FaultyDisk:
-        """What a process keeps."""
+        """Return the disk of a process."""
         return self._disks[address]
 
     def inject(self, address: int, side: Side, frame: bytes) -> None:
-        """A frame from nowhere."""
+        """Inject a frame at an end of a process."""
         if (process := self.stepper.processes.get(address)) is not None:
             process.on_frame(side, frame, self.world.local_clock(address, self.now))
 
     def send_depth(self, payload: bytes) -> None:
-        """Bytes on the key of the depth."""
+        """Publish bytes on the key of the depth."""
         if self.ground is not None:
             self.ground.on_depth(payload, self.world.local_clock(BASE, self.now))
 
     def drill(self, steps: Iterable[Step], observe: Callable[[], None] = lambda: None) -> None:
-        """Drill to the end, doing each step at its time and having everything observed from time to time."""
+        """Drill to the end with each step at its time; ``observe`` is called from time to time."""
         for step in steps:
             self.advance(step.at, observe)
             step.act(self)
@@ -163,7 +163,7 @@ class GauntletRig:
         self.advance(math.inf, observe)
 
     def repair(self) -> None:
-        """Everything has power and a disk that takes, and the crew has looked at the depth."""
+        """Give everything power and a working disk, and have the crew accept the depth."""
         self.world.depth_hidden, self.world.depth_error = False, 0.0
         self.world.forget()
         for address in EVERYBODY:
@@ -179,7 +179,7 @@ class GauntletRig:
             self.ground.store.close()
 
     def advance(self, to: float, observe: Callable[[], None] = lambda: None) -> None:
-        """Let rig time pass to ``to`` (s), having everything observed from time to time."""
+        """Advance rig time to ``to`` (s); ``observe`` is called from time to time."""
         while self._look_at <= min(to, self.world.end):
             self.scheduler.advance(self._look_at)
             self._look_at += LOOK_EVERY
@@ -187,7 +187,7 @@ class GauntletRig:
         self.scheduler.advance(to)
 
     def _take_place(self, address: int, tube: int | None) -> None:
-        """Put another tube with a blank disk in a place, or the one that belongs there."""
+        """Put ``tube`` with a blank disk in a place, or None: the one that belongs there."""
         self._numbers[address] = address if tube is None else tube
         if tube is None:
             self._disks[address], self.stepper.builders[address] = self._settled[address], self._builders[address]
@@ -209,7 +209,7 @@ def new_rig(plan: str, seed: int, folder: Path) -> GauntletRig:
 
 
 def make_ready(plan: str, seeds: Iterable[int]) -> None:
-    """Work out the worlds of these seeds, so that a seed's time is its own, and keep the collector from them."""
+    """Compute the worlds of these seeds, so that a seed's time is its own, and exempt them from garbage collection."""
     known = started_world.cache_info().currsize
     for number in sorted({seed % WORLDS for seed in seeds}):
         started_world(plan, number)

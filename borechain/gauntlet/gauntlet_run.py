@@ -30,7 +30,7 @@ FEW = 2  # kinds of faults that may never mislead the crew without a word, whate
 
 @dataclass(slots=True)
 class SeedOutcome:
-    """What became of a seed; ``schedule`` says when which fault did something, s of the run."""
+    """Outcome of a seed; ``schedule`` lists the acts of the faults with their time, s of the run."""
 
     seed: int
     kinds: tuple[str, ...]
@@ -83,7 +83,7 @@ def judge_seeds(
 
 
 def shrink_outcome(outcome: SeedOutcome) -> SeedOutcome:
-    """The failing seed with as few kinds as still make it fail."""
+    """Return the failing seed with the fewest kinds that still make it fail."""
     kept, worst = list(outcome.kinds), outcome
     for name in outcome.kinds:
         fewer = [other for other in kept if other != name]

@@ -44,7 +44,7 @@ class Observer:
 
     def __init__(self, rig: GauntletRig, since: float = math.inf, *, of_few: bool = True) -> None:
         self._rig = rig
-        self._of_few = of_few  # faults: then nothing is excused that nobody could see
+        self._of_few = of_few  # faults: then nothing is excused as unobservable
         self._since = since  # s, rig time of the truth at which the first fault begins
         self.seen: set[tuple[str, str, int]] = set()  # code, subject and count of every alarm so far
         self.told: dict[str, float] = {}  # s after the first fault at which an alarm was first seen
@@ -57,13 +57,13 @@ class Observer:
         rig.before_cut.append(self._see_alarms)  # what the crew has seen does not go with the power
 
     def look(self) -> None:
-        """Look now."""
+        """Look at the rig now."""
         self._see_alarms()
         for text in (*self._freshness(), *overlong_queues(self._rig), *self._repeated_starts()):
             self._tell(text)
 
     def on_frame(self, sender: int, side: Side, frame: bytes) -> None:
-        """A frame leaves a port: a receipt of the ground station must be true now."""
+        """Check a frame that leaves a port: a receipt of the ground station must be true now."""
         if sender != BASE or RECEIPT not in frame or (parsed := parse_frame(frame)) is None:
             return
         for _, payload in parsed[1]:
@@ -91,7 +91,7 @@ class Observer:
     def _stored(self) -> set[tuple[int, int, str]]:
         """Tube, number and content of what the database would hold after a cut.
 
-        What somebody took away counts while the process lives that had it: its receipts may be on their way.
+        Messages removed from outside count while the process that stored them lives: its receipts may be under way.
         """
         disk, keeper = self._rig.disk(BASE), self._rig.stepper.processes.get(BASE)
         image = disk.kept("ground.sqlite")
@@ -143,7 +143,7 @@ def find_violations(
 
     Where the encoder cannot be judged, its failure showing in nothing that measures, directions are not; where the
     depth cannot, neither is what it places and what it says is missing. Events are
-    not sent again, so an alarm that rests on them is lost with a database that somebody deletes or replaces under a
+    not sent again, so an alarm that rests on them is lost with a database that is deleted or replaced under a
     crew that has seen it.
     """
     shown = rig.inline.ask("alarms")
@@ -163,7 +163,7 @@ def find_violations(
 
 
 def _is_told(world: FaultyWorld, warned: set[str]) -> bool:
-    """Whether the crew knows that a yaw is wrong, and one may be: an alarm without a cause excuses nothing."""
+    """Return whether the crew knows that a yaw is wrong, and one may be: an alarm without a cause excuses nothing."""
     return bool(warned & YAW and (world.misled or (world.spoiled and "joint" in warned)))
 
 
@@ -187,7 +187,7 @@ def _each_once(rows: list[dict[str, Any]]) -> Iterator[str]:
 
 
 def _depths(rows: list[dict[str, Any]], world: FaultyWorld) -> Iterator[str]:
-    """A survey is taken at rest, so where a tube was during a rest of the schedule."""
+    """Violations of the surveys' depths: each is taken at rest, at a place of its tube in a rest of the schedule."""
     allowed = _rests(world)
     for row in rows:
         md, tube = row["md_m"], row["tube"]
@@ -209,7 +209,7 @@ def _directions(rig: GauntletRig) -> Iterator[str]:
 
 
 def _flags(model: RigModel) -> Iterator[str]:
-    """Flags have their effects: a faulty sensor's survey is not fused, and an unknown yaw gives no azimuth."""
+    """Violations of the flags' effects: a faulty sensor's survey is not fused, an unknown yaw gives no azimuth."""
     for station in model.stations:
         for cluster in station.clusters:
             if NodeFlag.SENSOR_FAULT in cluster.flags:
@@ -262,7 +262,7 @@ def _is_among(one: tuple[int, float], others: list[tuple[int, float]]) -> bool:
 
 
 def _nodes(rests: list[tuple[int, float]]) -> list[tuple[int, float]]:
-    """Tube and its depth (m) for every tube of each rest, of which the top tube and the depth of the bit are given."""
+    """Tube and its depth (m) for every tube of each rest, given the top tube and the depth of the bit."""
     return [(tube, md - TUBE_LENGTH * (tube - 1)) for top, md in rests for tube in range(1, top + 1)]
 
 

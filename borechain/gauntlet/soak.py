@@ -75,7 +75,7 @@ def _tables(seconds: float) -> dict[str, Any]:
 
 
 def _one_window(rig: GauntletRig, observer: Observer, number: int, begin: float) -> None:
-    """Faults that come and go within a window; at its end everything is repaired, as a crew would."""
+    """Run faults that come and go within a window; at its end everything is repaired, as a crew would."""
     kinds = drawn_kinds(number, HEALABLE)
     for _, step in steps_of(number, kinds, begin, begin + WINDOW_S):
         rig.advance(step.at, observer.look)

@@ -75,14 +75,14 @@ class Crowd(Process):
             self._drill(now, now - self._begun_at)
 
     def happen(self, now: float) -> None:
-        """Something that the ground station must never lose."""
+        """Raise an event that the ground station must never lose."""
         number = self.endpoint.mail.series.take()
         self.endpoint.mail.submit(Event(ENCODER, number, now, Severity.INFO, "stopped"), now)
         self.events += 1
 
     @property
     def receipted(self) -> int:
-        """Events that the ground station has receipted; asked on another thread it may be too few, never too many."""
+        """Number of events that the ground station has receipted; read on another thread too few, never too many."""
         events = self.events
         return events - self.endpoint.mail.outbox_size
 

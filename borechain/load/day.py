@@ -36,7 +36,7 @@ MOMENTS = 100  # that are looked at
 
 
 def measure_day(hours: float, tubes: int, endpoint: str, page: PageSettings, folder: Path) -> dict[str, Any]:
-    """Let a ground station start upon hours of surveys, and say how long it and whoever opens its page wait.
+    """Start a ground station on hours of surveys; return the seconds of its start and of the first answers of its page.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def depth_of(tubes: int, advances: int) -> float:
 
 
 def surveys_at(tubes: int, md: float, number: int, at: float) -> list[SurveyMeasurement]:
-    """What the tubes that hang in the hole survey at one stop, at ``at`` (s, rig time)."""
+    """Surveys of the tubes that hang in the hole at one stop, at ``at`` (s, rig time)."""
     inside = [tube for tube in up_to(tubes) if TUBE_LENGTH * (tube - 1) < md]
     return [replace(survey_of(tube, number, at, tubes - tube + 1), epoch=EPOCH) for tube in inside]
 
@@ -132,7 +132,7 @@ def first_picture(page: PageSettings) -> float:
 
 
 def answer_seconds(page: PageSettings, path: str) -> float:
-    """Seconds for which the page keeps whoever asks it for a path waiting."""
+    """Return the time (s) that the page takes to answer a request for ``path``."""
     begun = time.monotonic()
     with urllib.request.urlopen(f"{page.url}/api/{path}", timeout=CONNECT_S) as answer:
         answer.read()

@@ -31,7 +31,7 @@ LOOK_S = 0.002
 
 @dataclass
 class KillOutcome:
-    """What became of the events: handed over, receipted, kept, and how soon a new life receipted the first (s)."""
+    """Counts of events handed over, receipted and kept, and the times of the first receipts after each start (s)."""
 
     handed: int = 0
     lost: int = 0
@@ -47,7 +47,7 @@ class KillOutcome:
 def kill_again_and_again(
     times: int, endpoint: str, folder: Path, database: str | None = None, seed: int = 1
 ) -> KillOutcome:
-    """Kill a ground station ``times`` times at moments by lot, and count what its database keeps at the end.
+    """Kill a ground station ``times`` times at random moments, and count what its database keeps at the end.
 
     ``database`` is the URL of an empty one; SQLite in ``folder`` without it.
 
@@ -112,7 +112,7 @@ def await_receipts(crowd: Crowd, hand_over: Callable[[], None], wanted: int) -> 
 
 
 def wait_until(true: Callable[[], bool]) -> None:
-    """Look again and again at what is receipted."""
+    """Wait until ``true()``, asked again and again."""
     wait_for(lambda: true() or None, "the ground station was killed and has receipted nothing", PATIENCE_S, LOOK_S)
 
 

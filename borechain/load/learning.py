@@ -54,7 +54,7 @@ class Figure:
 
     @property
     def row(self) -> dict[str, Any]:
-        """As a table has it."""
+        """Row of a table."""
         return {
             "what": self.what, "unit": self.unit, "p50": self.p50, "p99": self.p99, "max": self.most,
             "count": self.count, "bound": self.bound, "holds": self.p99 <= self.bound,
@@ -62,7 +62,7 @@ class Figure:
 
 
 class LearningLoad:
-    """A ground station that is told what a string says, and asked meanwhile; what each takes is kept.
+    """A ground station that is told what a string says and asked meanwhile, each of it timed.
 
     Parameters
     ----------
@@ -91,14 +91,14 @@ class LearningLoad:
         return surveys_at(self._tubes, md, number, self._now)
 
     def learn_together(self, surveys: list[SurveyMeasurement], md: float) -> None:
-        """All surveys of a stop come before the next reading of the depth, as a string sends them."""
+        """Take all surveys of a stop before the next reading of the depth, as a string sends them."""
         before = time.process_time()
         self._take(surveys, md)
         self.ground.model.hole.settle()
         self.taken["learning each of a stop"].append((time.process_time() - before) / len(surveys))
 
     def learn_alone(self, surveys: list[SurveyMeasurement], md: float) -> None:
-        """Each comes by itself, and the hole is worked out after it, as the next look or the next question has it."""
+        """Take each survey by itself and compute the hole after it, as the next look or question does."""
         for survey in surveys:
             with self._timing("learning one alone"):
                 self._take([survey], md)
@@ -106,7 +106,7 @@ class LearningLoad:
                 self.ground.model.hole.settle()
 
     def learn_asked(self, surveys: list[SurveyMeasurement], md: float) -> None:
-        """Somebody asks after each of them; the first question waits until the hole is worked out."""
+        """Take surveys one by one with a query after each; the first query waits for the computed hole."""
         for survey in surveys:
             self._take([survey], md)
             for path in itertools.islice(self._questions, QUESTIONS):
@@ -114,13 +114,13 @@ class LearningLoad:
                     self.ground.operator.ask_json(path)
 
     def ask_first(self) -> None:
-        """Somebody asks for each path for the first time: what is kept from answer to answer is not there yet."""
+        """Ask for each path for the first time, when no answer is cached."""
         for path in ASKED:
             with self._timing("the first answer of each"):
                 self.ground.operator.ask_json(path)
 
     def _take(self, surveys: list[SurveyMeasurement], md: float) -> None:
-        """Surveys come, are stored, and find their depth with the next reading."""
+        """Take surveys: they are stored, and placed by the next reading of the depth."""
         for survey in surveys:
             self.ground.on_message(survey, self._now)
         self.ground.before_frames()

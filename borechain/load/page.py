@@ -41,7 +41,7 @@ ROUNDING = 2
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What the ground station is to bear."""
+    """Load of the ground station."""
 
     tubes: int = 50
     browsers: int = 3
@@ -119,7 +119,7 @@ def wait_for_readers(bus: ZenohBus, folder: Path, count: int) -> None:
 
 
 def readers_of(load: Load, endpoint: str, page: PageSettings, until: float, folder: Path) -> dict[str, Spec]:
-    """Processes of those who look."""
+    """Processes of the readers."""
     browsers = {
         f"browser {n}": Spec(follow_page, (page.host, page.port, until, folder / f"browser-{n}.json"))
         for n in range(load.browsers)
@@ -173,7 +173,7 @@ def ask_until(ground: Ground, bus: ZenohBus, table: ProcessTable, until: float) 
 
 
 def read_lateness(folder: Path, who: str) -> list[float]:
-    """What every reader of a kind has written, s."""
+    """Lateness (s) that every reader of a kind has written."""
     found: list[float] = []
     for path in sorted(folder.glob(f"{who}-*.json")):
         found += json.loads(path.read_text())
@@ -181,7 +181,7 @@ def read_lateness(folder: Path, who: str) -> list[float]:
 
 
 def latency_quantiles(seconds: list[float]) -> dict[str, float | None]:
-    """How many, and the median, 99th percentile and largest in ms."""
+    """Count of the latencies, and their median, 99th percentile and largest in ms."""
     if not seconds:
         return {"count": 0, "p50": None, "p99": None, "max": None}
     p50, p99 = (round(1e3 * float(value), ROUNDING) for value in np.percentile(seconds, (50.0, 99.0)))

@@ -12,7 +12,7 @@ Found = TypeVar("Found")
 
 
 def wait_for(look: Callable[[], Found | None], failing: str, seconds: float, every: float) -> Found:
-    """What ``look`` finds first, asked ``every`` s (wall time) for so many ``seconds``; None is nothing yet.
+    """Return the first result of ``look``, called every ``every`` s (wall time) for ``seconds``; None: nothing yet.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Whoever looks at a ground station under load: browsers that follow its page, terminals that follow its keys."""
+"""Readers of a ground station under load: browsers that follow its page, terminals that follow its keys."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def follow_page(host: str, port: int, until: float, out: Path) -> None:
 
 
 def follow_keys(endpoint: str, rig: str, until: float, out: Path) -> None:
-    """The same over the bus, as the crew's screen in a terminal hears it."""
+    """Follow the keys over the bus as the crew's screen does, and write how late each state of a tube was (s)."""
     begin_process("terminal")
     late: list[float] = []
     arrived: queue.SimpleQueue[tuple[str, dict[str, Any]]] = queue.SimpleQueue()
@@ -55,7 +55,7 @@ def follow_keys(endpoint: str, rig: str, until: float, out: Path) -> None:
 
 
 def answer_nothing(endpoint: str, until: float) -> None:
-    """Answer whoever asks for ``BARE`` at once till a time (s, monotonic): what bus and machine cost without work."""
+    """Answer queries of ``BARE`` at once until a time (s, monotonic): the cost of bus and machine without work."""
     begin_process("bare")
     with open_client(endpoint, CONNECT_S) as bus:
         bus.queryable_kept(BARE, answer_empty)
@@ -69,7 +69,7 @@ def answer_empty(query: Query) -> None:
 
 
 def state_lateness(path: str, answer: dict[str, Any]) -> list[float]:
-    """Seconds since a tube told its state, whose rig time is the clock of this machine; nothing of other answers."""
+    """Seconds since a tube told its state, whose rig time is this machine's clock; empty for other answers."""
     return [time.monotonic() - answer["at_s"]] if path.startswith(NODES) else []
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from node.process.drivers.timed import TimedEncoder, TimedImu
-from node.process.host import run_encoder, run_node
+from node.process.node_host import run_encoder, run_node
 from sim.rig.processes import ProcessTable, Spec
 from sim.rig.realtime import clock_offset, run
 from sim.world.recording import record, turning_once

@@ -29,7 +29,7 @@ def compare_rounds(ours: Sequence[float], peer: Sequence[float]) -> dict[str, An
 
 
 def below_interval(count: int) -> int:
-    """How many of ``count`` values in order lie below the interval of their median, and as many above it.
+    """Number of ``count`` ordered values below the interval of their median, and as many above it.
 
     Source: the number of values below the median is binomial with one half.
     """

@@ -39,7 +39,7 @@ Way = tuple[str, tuple[str, ...], tuple[str, ...]]  # name, messages that come i
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """What a subject may do with some keys."""
+    """Rights of a subject on some keys."""
 
     way: Way
     expressions: tuple[str, ...]
@@ -48,7 +48,7 @@ class Grant:
 def grants_of(rig: str, subject: str) -> list[Grant]:
     """Everything that the holder of a certificate may do; ``subject`` is its common name."""
     ground = keys.GROUND.format(rig=rig, path="**")
-    # who asks need not know the name of the rig: the authority, and so the router, is that of one rig
+    # a query need not name the rig: the authority, and so the router, is that of one rig
     ground_of_any, command_of_any = keys.GROUND.format(rig="*", path="**"), keys.COMMAND.format(rig="*", name="**")
     intake = keys.INTAKE.format(rig=rig)  # what the ground station takes in, for a recording
     intake_of_any = keys.INTAKE.format(rig="*")
@@ -122,7 +122,7 @@ def access_control(rig: str, names: Sequence[str]) -> dict[str, Any]:
 
 
 def write_access(folder: Path, rig: str, revoked: Iterable[int]) -> None:
-    """Write what a router of the rig lets whom do, as a part of its configuration.
+    """Write the access rules of a rig's router, as a part of its configuration.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def write_access(folder: Path, rig: str, revoked: Iterable[int]) -> None:
 
 
 def read_access(folder: Path) -> dict[str, Any]:
-    """What a router of the rig lets whom do.
+    """Return the access rules of a rig's router.
 
     Raises
     ------

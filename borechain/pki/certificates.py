@@ -1,7 +1,7 @@
 """Certificates of a rig: an authority of its own, and one certificate for each process and role.
 
-They name who connects, for the router's access control, and let nobody else read. They end after 30 years: nothing
-ends in the middle of a hole. Whom the rig no longer believes the router gives no rights any more (``access``).
+They name the process that connects, for the router's access control, and keep all others from reading. They end after
+30 years: none expires in the middle of a hole. A revoked process gets no rights from the router (``access``).
 """
 
 from __future__ import annotations

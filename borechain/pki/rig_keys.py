@@ -33,7 +33,7 @@ from telemetry.transport.key_ring import (
 
 SECRET_FILE = "rig.secret"
 SECRET_SIZE = 32  # bytes
-OVERLAP = datetime.timedelta(days=1)  # for which the keys of before a rotation are valid
+OVERLAP = datetime.timedelta(days=1)  # for which the old keys stay valid after a rotation
 ALWAYS = (BASE, ENCODER, DEPTH_SOURCE)  # processes that every rig has
 NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
@@ -50,7 +50,7 @@ class SecretGeneration:
 
 @dataclass(frozen=True, slots=True)
 class RigSecret:
-    """What a rig's folder holds beside the key files."""
+    """Content of a rig's folder beside the key files."""
 
     rig: str
     generations: tuple[SecretGeneration, ...]  # the oldest first
@@ -75,7 +75,7 @@ def init_rig(
     Raises
     ------
     KeyFileError
-        When the folder has a secret already, cannot be written, or the name is none.
+        When the folder has a secret already, cannot be written, or the name is invalid.
     """
     if not NAME.fullmatch(rig):
         raise KeyFileError(f"rig: expected 1 to 64 letters, digits, - and _, got {rig!r:.80}")
@@ -100,7 +100,7 @@ def add_tube(folder: Path, tube: int, now: datetime.datetime) -> Path:
     Raises
     ------
     KeyFileError
-        When the folder holds no rig's keys, the tube's were revoked, or the number is none.
+        When the folder holds no rig's keys, the tube's were revoked, or the number is invalid.
     """
     secret = read_secret(folder)
     if not 1 <= tube <= MAX_TUBE:
@@ -114,12 +114,12 @@ def add_tube(folder: Path, tube: int, now: datetime.datetime) -> Path:
 
 
 def revoke_tube(folder: Path, tube: int, now: datetime.datetime) -> RigSecret:
-    """Have a tube believed nothing from now on, and make new keys for all others.
+    """Revoke a tube, so that it is believed nothing from now on, and make new keys for all others.
 
     Raises
     ------
     KeyFileError
-        When the folder holds no rig's keys, or the number is none.
+        When the folder holds no rig's keys, or the number is invalid.
     """
     secret = read_secret(folder)
     if not 1 <= tube <= MAX_TUBE:
@@ -130,7 +130,7 @@ def revoke_tube(folder: Path, tube: int, now: datetime.datetime) -> RigSecret:
 
 
 def rotate_keys(folder: Path, now: datetime.datetime) -> RigSecret:
-    """Make new keys for everybody; those of before are valid for a day.
+    """Make new keys for all; the old ones stay valid for a day.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def rotate_keys(folder: Path, now: datetime.datetime) -> RigSecret:
 
 
 def retire_keys(folder: Path) -> RigSecret:
-    """Leave the keys of before the newest out of every file: all that matter have new ones.
+    """Remove all but the newest keys from every file, once every process of the rig has them.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def read_secret(folder: Path) -> RigSecret:
     Raises
     ------
     KeyFileError
-        When it cannot be read, is open to others or is none.
+        When it cannot be read, is open to others or is invalid.
     """
     path = folder / SECRET_FILE
     text = read_private(path)
@@ -193,7 +193,7 @@ def _rotate(folder: Path, secret: RigSecret, now: datetime.datetime) -> RigSecre
 
 
 def _write(folder: Path, secret: RigSecret, addresses: Iterable[int]) -> None:
-    """The secret last: until it is written the files of before the change can be made again."""
+    """Write the secret last: until then the earlier files can be made again."""
     for address in addresses:
         write_private(_file_of(folder, address), pack_ring(secret.ring(address)))
     write_access(folder, secret.rig, secret.revoked)

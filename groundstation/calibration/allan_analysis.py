@@ -36,7 +36,7 @@ FLOOR_TAU = 30.0  # s, where the published curve of the node's sensor has its fl
 
 @dataclass(frozen=True, slots=True)
 class AllanReading:
-    """One point of the curve, as it stands: high by the other terms at 1 s, by them and by luck at the minimum."""
+    """One point of the curve as read: too high by the other terms at 1 s, by them and by chance at the minimum."""
 
     tau: float
     deviation: float
@@ -185,7 +185,7 @@ def _analyse_axis(record: Array, rate: float, axis: str) -> AllanResult:
 
 
 def _at_rate(found: AllanFit, rate: float) -> AllanFit:
-    """From samples to seconds: N^2 / n = N^2 / rate / tau, K^2 n / 3 = K^2 rate tau / 3."""
+    """Convert a fit per sample to one per second: N^2 / n = N^2 / rate / tau, K^2 n / 3 = K^2 rate tau / 3."""
     white, walk = _scaled(found.random_walk, 1.0 / math.sqrt(rate)), found.rate_walk
     slow = _scaled(walk, math.sqrt(rate)) if walk is not None else None
     return replace(found, random_walk=white, rate_walk=slow)

@@ -118,7 +118,7 @@ def read_attitudes(path: Path, limit: float = LARGEST) -> Attitudes:
     Raises
     ------
     CalibrationError
-        When the file is none, is too short, a reading is saturated or in g, or the angles are in rad.
+        When the file is invalid or too short, a reading is saturated or in g, or the angles are in rad.
     """
     table = read_table(path, (ATTITUDES_HEADER,))
     rows = np.array([table.numbers(k, 1) for k in range(len(table.lines))])

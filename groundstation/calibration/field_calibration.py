@@ -55,7 +55,7 @@ def calibrate_accelerometer(rests: Sequence[Rest], gravity: float, day: str) -> 
     Raises
     ------
     CalibrationError
-        When a record moved or is none, the attitudes are too few or leave something open, or the residuals say that
+        When a record moved or is invalid, the attitudes are too few or leave something open, or the residuals say that
         an attitude was not the one reported; it names which.
     """
     _check(rests, gravity)

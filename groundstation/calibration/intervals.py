@@ -38,7 +38,7 @@ BELOW = np.array([0.5 * math.erfc(-step / math.sqrt(2.0)) for step in DEVIATIONS
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """What noise and jig do to one parameter and to the residuals beside it."""
+    """Effect of noise and of the jig's errors on one parameter and on its residuals."""
 
     by_noise: float  # variance of the parameter for a noise of variance one
     by_jig: float  # its variance by the jig
@@ -127,5 +127,5 @@ def _summed(values: Array, knots: npt.NDArray[np.intp]) -> Array:
 
 
 def _below(x: Array) -> Array:
-    """Distribution function of the normal distribution."""
+    """Standard normal distribution function."""
     return np.asarray(np.interp(x, DEVIATIONS, BELOW))

@@ -85,7 +85,7 @@ def combined_uncertainty(
 
 
 def spreads_of(basis: Array, shown: Array) -> list[list[Spread]]:
-    """What noise and jig do to coefficients (k, 3) of a basis (n, k); ``shown`` (n, 3, n, 3) of the readings."""
+    """Spread of each coefficient (k, 3) of a basis (n, k); ``shown`` (n, 3, n, 3): covariance by the jig."""
     n, k = basis.shape
     gain = np.linalg.pinv(basis)
     left = np.eye(n) - basis @ gain

@@ -45,11 +45,11 @@ class TriadCalibration:
         self.triad()
 
     def triad(self) -> Triad:
-        """What is applied."""
+        """Return the triad that these coefficients describe."""
         return Triad.of(SENSORS[self.sensor], self.coefficients)
 
     def plain(self) -> dict[str, Any]:
-        """The content as JSON knows it."""
+        """Return the content as a JSON object."""
         return {
             "sensor": self.sensor,
             "parameters": self.parameters,
@@ -66,7 +66,7 @@ class TriadCalibration:
 
 
 def of_fit(fit: MwdFit, sensor: str, provenance: Mapping[str, Any]) -> TriadCalibration:
-    """What a fit leaves behind."""
+    """Return the calibration file's content for a fit."""
     return TriadCalibration(sensor, fit.parameters, fit.coefficients, fit.standard_errors, fit.temperatures, provenance)
 
 

@@ -70,7 +70,7 @@ class Triad:
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """What a calibrated tool says: ``gravity`` (n, 3) g, ``field`` (n, 3), G_L, H_L, tilt and azimuth (n,) rad."""
+    """Calibrated readings: ``gravity`` (n, 3) g, ``field`` (n, 3), G_L, H_L, tilt and azimuth (n,) rad."""
 
     gravity: Array
     field: Array
@@ -93,7 +93,7 @@ def coefficient_names(axes: str, parameters: int = 30) -> list[str]:
 
 
 def nominal_triad(axes: str, volts_per_unit: float) -> Triad:
-    """Tool as drawn: one scale factor, no bias, no misalignment."""
+    """Triad of the nominal tool: one scale factor, no bias, no misalignment."""
     scale = np.zeros((3, POWERS))
     scale[:, 0] = volts_per_unit
     return Triad(axes, scale, np.zeros((3, POWERS)), np.zeros(6))
@@ -174,7 +174,7 @@ def magnetic_dip(gravity: Array, field: Array) -> Array:
 def tool_readings(
     accelerometers: Triad, magnetometers: Triad, gravity_volts: Array, field_volts: Array, temperature: Array
 ) -> Readings:
-    """Everything a tool says about n readings. Source: eqs. (1)-(12)."""
+    """Calibrated readings of voltages (n, 3) and temperatures (n,) C. Source: eqs. (1)-(12)."""
     gravity = vectors_of_volts(accelerometers, gravity_volts, temperature)
     field = vectors_of_volts(magnetometers, field_volts, temperature)
     sizes = np.linalg.norm(gravity, axis=1), np.linalg.norm(field, axis=1)

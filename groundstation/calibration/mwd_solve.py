@@ -166,7 +166,7 @@ def fit_triad(record: TriadRecord, parameters: int, jig: Jig | None = None) -> M
 
 
 def _degrees(problem: Problem, free: Array) -> int:
-    """Of freedom: a reading has a size and one angle, on the axis two."""
+    """Degrees of freedom of the residuals: two a reading (size, angle), three on the axis, less the free parameters."""
     return 2 * len(problem.angle) + int(problem.on_axis().sum()) - int(free.shape[1])
 
 

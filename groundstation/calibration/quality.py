@@ -29,7 +29,7 @@ STEEPEST = math.radians(1.0)  # inclination from which an azimuth means somethin
 
 @dataclass(frozen=True, slots=True)
 class QualityVerdict:
-    """One quantity: what it spread over the tool faces and what it may."""
+    """Verdict on one quantity: its spread over the tool faces and the limit."""
 
     name: str
     unit: str

@@ -38,7 +38,7 @@ BUSY = f"the ground station has {WAITING} questions to answer; ask again later"
 COMMON_PARAMETERS = ("accept",)
 ENCODINGS = {"json": JSON, "msgpack": MSGPACK}
 INTAKE_AT_ONCE = 500  # events of one answer
-PRIVATE = ("folder", "key_file", "keys", "database_url", "wall", "hole")  # settings that are nobody's business
+PRIVATE = ("folder", "key_file", "keys", "database_url", "wall", "hole")  # settings that are not published
 WHO = "zenoh"  # ordered, where the order does not say
 
 Handler = Callable[[Query], None]
@@ -64,7 +64,7 @@ class ZenohGateway:
         self._publishers: dict[str, Publisher] = {}
         self._late: dict[str, None] = {}  # paths of the hole that are to be put
         self._intake = bus.publisher(keys.INTAKE.format(rig=self._rig), MSGPACK, droppable=True)
-        self._taped = 0  # newest event of the intake that was published, 0 while nobody listens
+        self._taped = 0  # newest event of the intake that was published, 0 without a listener
         self._told = dict(process.model.seen)  # newest row of each stream that was published, or there before
         process.listeners.append(self._publish)
         bus.queryable_kept(self._key("**"), partial(self._arrive, self._answer))
@@ -82,7 +82,7 @@ class ZenohGateway:
                 task.cancel()
 
     def _handle(self, handle: Handler, query: Query) -> None:
-        """Answer one query; a fault of ours is counted and told to whoever asked, and the next one is answered."""
+        """Answer one query; an internal error is counted and reported in the answer, and the next query is answered."""
         try:
             handle(query)
         except Exception as error:
@@ -107,7 +107,7 @@ class ZenohGateway:
     def _publish(self, changed: list[str]) -> None:
         """Put the present value of each path, and before it what it came from.
 
-        What shows the whole hole is put one path a turn of the loop: who asks meanwhile waits for one of them at most.
+        What shows the whole hole is put one path a turn of the loop: a query meanwhile waits for one of them at most.
         """
         self._publish_intake()
         late = dict.fromkeys(path for path in changed if is_of_the_hole(path))
@@ -137,7 +137,7 @@ class ZenohGateway:
             self._publishers[path].put(self._news(path))
 
     def _publish_intake(self) -> None:
-        """Put what was taken in since the last time; whoever began to listen gets all that is kept first."""
+        """Put what was taken in since the last time; a new listener gets all that is kept first."""
         tape, process = self._process.tape, self._process
         if not self._intake.is_heard:
             self._taped = 0
@@ -151,7 +151,7 @@ class ZenohGateway:
         self._taped = tape.newest
 
     def _answer_intake(self, query: Query) -> None:
-        """Give whoever records what did not reach it: the events after number ``since`` that are kept."""
+        """Answer a recorder with the kept events after number ``since``."""
         since = query.parameters.get("since", "0")
         if not since.isdecimal() or len(since) > LONGEST_NUMBER:
             refuse(query, f"parameter since: expected a whole number, got {since!r:.40}")

@@ -21,7 +21,7 @@ REPEATED_ORDERS = ("accept_depth", "accept_joints", "alarm")  # of the ground st
 
 @dataclass(slots=True)
 class TapeClock:
-    """Rig time as it was when the event of now was taken in."""
+    """Rig time as it was when the current event was taken in."""
 
     rig_now: float = math.nan
     epoch: int = 0
@@ -61,14 +61,14 @@ class Replayed:
         self.ground.clock = self._clock
 
     def give(self, event: Intake) -> None:
-        """Have an event happen; one told twice counts once."""
+        """Apply an event; one given twice counts once."""
         if event.kind == BEGIN or event.number <= self._last:
             return
         self.missing += event.number - self._last - 1
         self.events, self._last = self.events + 1, event.number
         self._clock.rig_now, self._clock.epoch = event.rig_now, event.epoch
         apply_event(self.ground, event)
-        self.ground.take_frames(event.now)  # to nobody
+        self.ground.take_frames(event.now)  # discarded
 
 
 def open_replay(recording: Recording, folder: Path) -> tuple[Replayed, Iterator[Intake]]:
@@ -97,7 +97,7 @@ def intake_of(recording: Recording) -> Iterator[Intake]:
 
 
 def replay_file(recording: Recording, folder: Path) -> Replayed:
-    """Give a new ground station in ``folder`` the whole intake of a recording; errors as ``open_replay``."""
+    """Replay the whole intake of a recording to a new ground station in ``folder``; errors as ``open_replay``."""
     replayed, events = open_replay(recording, folder)
     for event in events:
         replayed.give(event)
@@ -105,7 +105,7 @@ def replay_file(recording: Recording, folder: Path) -> Replayed:
 
 
 def apply_event(ground: GroundProcess, event: Intake) -> None:
-    """Have one event happen."""
+    """Apply one event."""
     if event.kind == MESSAGE:
         ground.on_message(event.content, event.now)
     elif event.kind == DEPTH:

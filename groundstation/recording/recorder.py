@@ -23,7 +23,7 @@ WAITING = 100_000  # samples that may wait to be written; more are dropped and c
 
 @dataclass(slots=True)
 class RecordingSummary:
-    """How a recording went: samples, events of the intake that are missing, and samples dropped here."""
+    """Counts of a recording: samples, events of the intake that are missing, and samples dropped here."""
 
     samples: int = 0
     first: int = 0  # number of the first event of the intake
@@ -85,7 +85,7 @@ class Recorder:
         self.course.samples += 1
 
     def _take_intake(self, sample: RecordedSample) -> None:
-        """Write an event once, in its order; what did not reach us before it is asked for."""
+        """Write an event once, in its order; missing earlier ones are asked for."""
         number = number_of(sample.payload)
         if number > self.course.newest + 1:
             self._ask_for_more()
@@ -118,7 +118,7 @@ class Recorder:
 
 
 def number_of(payload: bytes) -> int:
-    """Number of an event; 0 of what is none, and of the settings."""
+    """Number of an event; 0 of the settings and of anything else."""
     try:
         event = unpack_intake(payload)
     except IntakeError:

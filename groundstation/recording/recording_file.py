@@ -27,7 +27,7 @@ NUMBER = re.compile(r"(?<=/)[0-9]+(?=/|$)")
 
 
 class RecordingError(InputError, ValueError):
-    """The file is no recording that can be read."""
+    """The file is not a readable recording."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ class Recording:
         Raises
         ------
         RecordingError
-            When it is no recording of this version.
+            When it is not a recording of this version.
         """
         try:
             with self.path.open("rb") as file:

@@ -33,7 +33,7 @@ def show_recording(recording: Recording, folder: Path, page: PageSettings, speed
 
 
 async def serve_recording(replayed: Replayed, events: Iterator[Intake], page: PageSettings, speed: float) -> None:
-    """The page, with the events given beside it."""
+    """Serve the page while the events are given to the ground station."""
     ended = asyncio.Event()
     stop_on_signals(ended.set)
     with page_of(page) as serve_page:
@@ -47,7 +47,7 @@ async def serve_recording(replayed: Replayed, events: Iterator[Intake], page: Pa
 
 
 async def give_all(replayed: Replayed, events: Iterator[Intake], speed: float) -> None:
-    """Give every event at its time."""
+    """Apply every event at its time."""
     loop = asyncio.get_running_loop()
     begun_at, first = loop.time(), None
     for number, event in enumerate(events):

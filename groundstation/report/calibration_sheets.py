@@ -92,7 +92,7 @@ def linear_sheet(title: str, fit: AttitudeFit, at: AttitudeErrors, matrix_unit: 
 
 
 def expanded_uncertainty_text(fit: AttitudeFit) -> str:
-    """How the expanded uncertainty follows from the standard errors."""
+    """Text on how the expanded uncertainty follows from the standard errors."""
     if fit.combined is not None:
         return "noise and jig together"
     return f"{number_text(fit.coverage_factor(), 3)} standard errors"

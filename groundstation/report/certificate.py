@@ -24,7 +24,7 @@ class CertificateError(GroundError, RuntimeError):
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What was calibrated and from what: words, the day, the record with its hash, the block's hash, the software."""
+    """Subject and sources of a calibration: words, day, record with its hash, hash of the block, software."""
 
     subject: str
     day: date

@@ -30,7 +30,7 @@ CLAUSES = {
 
 @dataclass(frozen=True, slots=True)
 class ReportSite:
-    """What a report says of the place: project, client, north, and site coordinates (m) of the zero, if any."""
+    """Site of a report: project, client, north, and site coordinates (m) of the zero, if any."""
 
     project: str = ""
     client: str = ""
@@ -75,7 +75,7 @@ class ColumnRecord:
     actions: Sequence[str] = ()  # what is to be done about it
 
     def deviations(self) -> list[Deviation]:
-        """Against the design at every station that was surveyed."""
+        """Deviations from the design at every surveyed station."""
         found = []
         for md, place, cov in zip(self.md, self.positions, self.covs, strict=True):
             if md <= self.surveyed_md + 1e-6:
@@ -161,7 +161,7 @@ def _design_facts(record: ColumnRecord, site: ReportSite) -> list[tuple[str, str
 
 
 def instrument_facts(record: ColumnRecord) -> list[tuple[str, str]]:
-    """Which instrument surveyed a column, and by which calibration."""
+    """Facts on the instrument that surveyed a column, and on its calibration."""
     if not math.isfinite(record.surveyed_md):
         return [("Error model", "none, the column was not surveyed")]
     tool = record.tool

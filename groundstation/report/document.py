@@ -27,7 +27,7 @@ class ReportError(GroundError, RuntimeError):
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """What a report rests on: the day, the software, and every input by name with its SHA-256."""
+    """Sources of a report: the day, the software, and every input by name with its SHA-256."""
 
     day: date
     software: str
@@ -50,7 +50,7 @@ class ReportSection:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A whole report; ``good`` says how the verdict is to look."""
+    """A whole report; ``good`` is how the verdict is drawn."""
 
     kind: str
     title: str

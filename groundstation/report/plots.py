@@ -61,7 +61,7 @@ def survey_figure(
     Raises
     ------
     SurveyError
-        When the arrays do not fit each other or the confidence is none.
+        When the arrays do not fit each other or the confidence is not between 0 and 1.
     """
     n = len(md)
     if n < 2 or positions.shape != (n, 3) or covs.shape != (n, 3, 3):
@@ -111,7 +111,7 @@ def survey_figure(
 
 
 def _off_axis(position: Array, design: ColumnDesign | None) -> tuple[float, float]:
-    """Distance (m) from the design axis and what is allowed there."""
+    """Distance (m) from the design axis and its tolerance (m) there."""
     if design is None:
         return 0.0, math.inf
     offset = position - np.array(design.head)

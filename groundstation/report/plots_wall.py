@@ -45,7 +45,7 @@ LINES = ("-", "--", ":", "-.")
 
 
 def joint_name(columns: Columns, found: Joints, joint: int) -> str:
-    """Names of its two columns."""
+    """Names of the two columns of a joint."""
     a, b = found.pairs[joint]
     return f"{columns.names[a]}–{columns.names[b]}"
 
@@ -63,7 +63,7 @@ def band_of_thickness(columns: Columns, found: Joints, joint: int) -> tuple[Arra
 
 
 def thinness_ranking(found: Joints) -> npt.NDArray[np.intp]:
-    """Joints, the one that most probably is too thin first; of equals the thinnest."""
+    """Indices of joints, most probably too thin first; of equals the thinnest."""
     probability = np.where(np.isfinite(found.probability), found.probability, -1.0).max(axis=1)
     thin = np.where(np.isfinite(found.thickness), found.thickness, np.inf).min(axis=1)
     return np.lexsort((thin, -probability))
@@ -137,7 +137,7 @@ def _thickness(
     which: npt.NDArray[np.intp],
     bad: npt.NDArray[np.bool_],
 ) -> None:
-    """Thickness over depth; the band of the worst one only, for bands on bands say nothing."""
+    """Draw the thickness over depth; the band of the worst joint only, since bands on bands cannot be read."""
     for rank, joint in enumerate(which):
         colour = (WRONG if rank == 0 else ALARMS[0]) if bad[joint] else (INK if rank == 0 else GREY)
         label = joint_name(columns, found, int(joint)) + _missing_words(columns, found, int(joint))
@@ -159,7 +159,7 @@ def _thickness(
 
 
 def _missing_words(columns: Columns, found: Joints, joint: int) -> str:
-    """Where a joint is not there, which has no thickness to draw."""
+    """Words on where a joint is missing, which has no thickness to draw."""
     missing = np.flatnonzero(found.states[joint] == ColumnState.MISSING)
     return f", missing from {columns.depths[missing[0]]:g} m" if len(missing) else ""
 
@@ -208,7 +208,7 @@ def _map(axes: Axes, columns: Columns, found: Joints, required: float, allowed: 
 
 
 def _marked(axes: Axes, flags: npt.NDArray[np.bool_], edge: Array, edges: Array, state: ColumnState) -> bool:
-    """Draw over the cells (joints, depths) of a state what no shade of grey says; whether there are any."""
+    """Draw marks over the cells (joints, depths) of a state that no grey shows; returns whether there are any."""
     look: dict[str, Any] = {"fc": "none", "ec": INK, "hatch": "////"}
     if state == ColumnState.MISSING:
         look = {"fc": WRONG, "ec": INK, "hatch": "xxxx"}

@@ -21,7 +21,7 @@ class SheetTable:
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """One result: ``facts`` by name, tables and warnings."""
+    """One calibration result: ``facts`` by name, tables and warnings."""
 
     title: str
     facts: Sequence[tuple[str, str]]

@@ -138,7 +138,7 @@ def log_if_needed(axes: Axes, values: Iterable[Array]) -> None:
 
 
 def above_zero(values: Array) -> Array:
-    """Zero has no place on a logarithmic axis."""
+    """Return the values with NaN for those of zero or below, which a logarithmic axis cannot show."""
     return np.where(values > 0.0, values, np.nan)
 
 

@@ -29,7 +29,7 @@ WORDS = {
 
 
 def site_of(wall: Wall) -> ReportSite:
-    """What the wall's file says of the place."""
+    """Site of a report, from the wall's file."""
     file = wall.file
     depths = file.depth_reference
     if file.depths_read_from != depths:
@@ -216,7 +216,7 @@ def _voids_sections(wall: Wall, judgement: Judgement) -> list[ReportSection]:
 
 
 def _closing_sections(wall: Wall) -> list[ReportSection]:
-    """How it closed, a row a day of drilling."""
+    """Section on the closing of the wall, a row a day of drilling."""
     rows = []
     for stage in wall.stages:
         spacing = ("–", "–", "–")

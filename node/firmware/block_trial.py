@@ -9,7 +9,7 @@ import numpy as np
 
 from node.kernels.arithmetic.formats import DEG, Array
 from node.kernels.filter.modes import UNBIASED_STILL_RATE
-from node.kernels.sensors.correction import COLDEST, HOTTEST, USUAL, calibrate, identity_parameters
+from node.kernels.sensors.correction import COLDEST, HOTTEST, USUAL, correct_cycle, identity_parameters
 from telemetry.messages import Vector3
 from telemetry.parameters import POWERS, ParameterBlock, SensorParameters
 
@@ -23,7 +23,7 @@ DIFFER_CYCLES = 8  # that must contradict before it is refused
 SENSORS = ("gyroscope", "accelerometer")
 
 
-class Verdict(enum.Enum):
+class TrialVerdict(enum.Enum):
     """What a trial has come to."""
 
     WAIT = enum.auto()
@@ -45,7 +45,7 @@ def record_of(block: ParameterBlock) -> Array:
     return made
 
 
-def unfit(block: ParameterBlock, tube: int) -> str:
+def unfit_reason(block: ParameterBlock, tube: int) -> str:
     """Why a block can be used on no reporter, on this tube; empty when it can. For a block that was accepted once."""
     if block.tube != tube:
         return f"tube: expected {tube}, got {block.tube}"
@@ -55,11 +55,11 @@ def unfit(block: ParameterBlock, tube: int) -> str:
     return ""
 
 
-def refusal(block: ParameterBlock, tube: int, in_use: ParameterBlock) -> str:
+def refusal_reason(block: ParameterBlock, tube: int, in_use: ParameterBlock) -> str:
     """Why a block that arrives is not taken; empty when it may be tried."""
     if block.version <= in_use.version:
         return f"version: expected newer than {in_use.version}, got {block.version}"
-    if reason := unfit(block, tube):
+    if reason := unfit_reason(block, tube):
         return reason
     for name in SENSORS:
         matrix, before = np.array(getattr(block, name).matrix), np.array(getattr(in_use, name).matrix)
@@ -69,7 +69,7 @@ def refusal(block: ParameterBlock, tube: int, in_use: ParameterBlock) -> str:
     return ""
 
 
-def recorrect(state: Any, before: ParameterBlock, after: ParameterBlock, temperature: float) -> None:
+def recorrect_ring(state: Any, before: ParameterBlock, after: ParameterBlock, temperature: float) -> None:
     """Read the cycles that are still in the ring, which ``before`` corrected, by ``after`` instead."""
     for name, ring in (("gyroscope", "ring_rate"), ("accelerometer", "ring_force")):
         old, new = getattr(before, name), getattr(after, name)
@@ -107,25 +107,25 @@ class Trial:
 
     def judge_reading(
         self, rate: Vector3, force: Vector3, temperature: float, *, standing: bool, quiet: bool
-    ) -> Verdict:
+    ) -> TrialVerdict:
         """Try one cycle's raw reading (rad/s, m/s^2, C).
 
         ``standing`` is what the node takes for rest, ``quiet`` whether it knows it by the block in use.
         """
         w, f = np.array(rate), np.array(force)
-        calibrate(self._record[0], temperature, w, f)
+        correct_cycle(self._record[0], temperature, w, f)
         if not standing or not (np.all(np.isfinite(w)) and np.all(np.isfinite(f))):
             self._agreed = self._differed = 0
-            return Verdict.WAIT
+            return TrialVerdict.WAIT
         fastest, weight = float(np.abs(w).max()), float(np.linalg.norm(f))
         if fastest < UNBIASED_STILL_RATE and abs(weight - self._gravity) <= MAX_FORCE_ERROR * self._gravity:
             self._agreed, self._differed = self._agreed + 1, 0
-            return Verdict.APPLY if self._agreed >= STILL_CYCLES else Verdict.WAIT
+            return TrialVerdict.APPLY if self._agreed >= STILL_CYCLES else TrialVerdict.WAIT
         self._agreed, self._differed = 0, self._differed + int(quiet)
         if self._differed < DIFFER_CYCLES:
-            return Verdict.WAIT
+            return TrialVerdict.WAIT
         self.reason = f"at rest it gives {fastest / DEG:.3g} deg/s and {weight:.4g} m/s^2"
-        return Verdict.REFUSE
+        return TrialVerdict.REFUSE
 
 
 def _unfit_sensor(sensor: SensorParameters, max_bias: float) -> str:

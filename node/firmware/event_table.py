@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from node.firmware.alignment import NAMES_OF_METHODS
+from node.firmware.alignment_orders import NAMES_OF_METHODS
 from node.firmware.pending_event import PendingEvent
 from node.kernels.arithmetic.formats import DEG
 from node.kernels.record.events import Code, Fault
@@ -25,7 +25,7 @@ NAMES_OF_FAULTS: Final = {fault: fault.name.lower() for fault in Fault}
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class EventSpec:
     """One line of the table: the event's name, severity and meaning, and how each argument is made of its number.
 
     Where an argument is made of several numbers, ``words`` makes all of them.
@@ -43,7 +43,7 @@ def fault_name(number: float) -> str:
     return NAMES_OF_FAULTS[Fault(int(number))]
 
 
-def exclusion(number: float) -> str:
+def exclusion_reason(number: float) -> str:
     """Why an IMU was left out: its fault, or none and the others disagree with it."""
     return fault_name(number) if number else "disagrees"
 
@@ -107,132 +107,132 @@ MOUNTED: Final = (
     ("noise_deg", float),
     ("samples", int),
 )
-EVENT_TABLE: Final[dict[Code, Told]] = {
-    Code.BAD_SAMPLE: Told("bad_sample", Severity.ERROR, "a reading was not finite; neither sensor is used"),
-    Code.GYRO_SATURATED: Told(
+EVENT_TABLE: Final[dict[Code, EventSpec]] = {
+    Code.BAD_SAMPLE: EventSpec("bad_sample", Severity.ERROR, "a reading was not finite; neither sensor is used"),
+    Code.GYRO_SATURATED: EventSpec(
         "gyro_saturated", Severity.ERROR, "the gyroscope was at its range; the encoder's rate stands for its own"
     ),
-    Code.GYRO_STUCK: Told(
+    Code.GYRO_STUCK: EventSpec(
         "gyro_stuck", Severity.ERROR, "the gyroscope repeats itself bit for bit; the encoder's rate stands for its own"
     ),
-    Code.GYRO_STEP: Told(
+    Code.GYRO_STEP: EventSpec(
         "gyro_step", Severity.ERROR, "the gyroscope's bias took a step; the constant bias takes it", MISMATCH
     ),
-    Code.GYRO_SCALE: Told(
+    Code.GYRO_SCALE: EventSpec(
         "gyro_scale", Severity.ERROR, "the gyroscope's scale changed; its variance is opened", MISMATCH
     ),
-    Code.FORCE_SATURATED: Told(
+    Code.FORCE_SATURATED: EventSpec(
         "force_saturated", Severity.ERROR, "the accelerometer was at its range; no levelling and no survey by it"
     ),
-    Code.FORCE_STUCK: Told(
+    Code.FORCE_STUCK: EventSpec(
         "force_stuck", Severity.ERROR, "the accelerometer repeats itself bit for bit; no levelling and no survey by it"
     ),
-    Code.SENSOR_RECOVERED: Told(
+    Code.SENSOR_RECOVERED: EventSpec(
         "sensor_recovered",
         Severity.WARNING,
         "a flagged sensor has proved itself and is used again",
         (("after", fault_name), ("cycles", int)),
     ),
-    Code.CLOCK_JUMPED: Told(
+    Code.CLOCK_JUMPED: EventSpec(
         "clock_jumped",
         Severity.ERROR,
         "the node's clock jumped; what was timed before is dropped and the yaw is unknown",
         (("by_s", float),),
     ),
-    Code.AIDING_UNTIMELY: Told(
+    Code.AIDING_UNTIMELY: EventSpec(
         "aiding_untimely", Severity.ERROR, "an aiding's time is invalid or in the future; it is not used"
     ),
-    Code.STRING_UNDER_TORQUE: Told(
+    Code.STRING_UNDER_TORQUE: EventSpec(
         "string_under_torque", Severity.INFO, "the string came under torque, which may turn this tube", TWISTED
     ),
-    Code.STRING_RELEASED: Told(
+    Code.STRING_RELEASED: EventSpec(
         "string_released", Severity.INFO, "the drive let the string go; what twist may be trapped is told", TWISTED
     ),
-    Code.JOINT_SOLVED: Told(
+    Code.JOINT_SOLVED: EventSpec(
         "joint_solved", Severity.INFO, "the yaw below a new joint is that of the string that stood still", JOINT
     ),
-    Code.JOINT_CONTRADICTS_MARKS: Told(
+    Code.JOINT_CONTRADICTS_MARKS: EventSpec(
         "joint_contradicts_marks",
         Severity.WARNING,
         "the solved joint and its scribe marks differ by more than 4 sigmas; read the marks again",
         JOINT,
     ),
-    Code.JOINT_NOT_SOLVED: Told(
+    Code.JOINT_NOT_SOLVED: EventSpec(
         "joint_not_solved",
         Severity.WARNING,
         "a new joint was not solved; its marks are used",
         (("reason", joint_reason), ("hops", int)),
     ),
-    Code.STOPPED: Told("stopped", Severity.INFO, "the string came to rest", YAW),
-    Code.STARTED: Told("started", Severity.INFO, "the string turns", YAW),
-    Code.JOINT_OPENED: Told("joint_opened", Severity.INFO, "the tube above is gone; the node holds its yaw", YAW),
-    Code.JOINT_CLOSED: Told("joint_closed", Severity.INFO, "a tube is above again", YAW),
-    Code.BIAS_KNOWN: Told("bias_known", Severity.INFO, "the gyroscope's constant bias is learnt", YAW),
-    Code.REFERENCE_CHANGED: Told(
+    Code.STOPPED: EventSpec("stopped", Severity.INFO, "the string came to rest", YAW),
+    Code.STARTED: EventSpec("started", Severity.INFO, "the string turns", YAW),
+    Code.JOINT_OPENED: EventSpec("joint_opened", Severity.INFO, "the tube above is gone; the node holds its yaw", YAW),
+    Code.JOINT_CLOSED: EventSpec("joint_closed", Severity.INFO, "a tube is above again", YAW),
+    Code.BIAS_KNOWN: EventSpec("bias_known", Severity.INFO, "the gyroscope's constant bias is learnt", YAW),
+    Code.REFERENCE_CHANGED: EventSpec(
         "reference_changed", Severity.INFO, "the aiding comes over other joints than before", YAW
     ),
-    Code.YAW_RESET: Told(
+    Code.YAW_RESET: EventSpec(
         "yaw_reset", Severity.WARNING, "five aidings in a row contradicted the yaw; it starts anew from the aiding", YAW
     ),
-    Code.RATE_EXCEEDED: Told(
+    Code.RATE_EXCEEDED: EventSpec(
         "rate_exceeded", Severity.ERROR, "the string turns too fast to be followed; the yaw is unknown", YAW
     ),
-    Code.RATE_RECOVERED: Told("rate_recovered", Severity.WARNING, "the string is slow enough again", YAW),
-    Code.UNREADABLE: Told("bad_sample", Severity.ERROR, "the filter was given a reading that is not finite", YAW),
-    Code.FILTER_FAULT: Told(
+    Code.RATE_RECOVERED: EventSpec("rate_recovered", Severity.WARNING, "the string is slow enough again", YAW),
+    Code.UNREADABLE: EventSpec("bad_sample", Severity.ERROR, "the filter was given a reading that is not finite", YAW),
+    Code.FILTER_FAULT: EventSpec(
         "filter_fault",
         Severity.ERROR,
         "the filter's covariance was invalid; it starts over with its constant bias",
         YAW,
     ),
-    Code.AIDING_REJECTED: Told(
+    Code.AIDING_REJECTED: EventSpec(
         "aiding_rejected",
         Severity.WARNING,
         "an aiding is farther from the yaw than its gate allows",
         (("sigmas", float),),
     ),
-    Code.ALIGNMENT_BEGUN: Told(
+    Code.ALIGNMENT_BEGUN: EventSpec(
         "alignment_begun",
         Severity.INFO,
         "an alignment was ordered; the node waits for the string to turn slowly",
         (("method", method_name), ("turns", float)),
     ),
-    Code.ALIGNMENT_TURNING: Told(
+    Code.ALIGNMENT_TURNING: EventSpec(
         "alignment_turning",
         Severity.INFO,
         "the string turns steadily; the alignment takes it in",
         (("rate_dps", float),),
     ),
-    Code.ALIGNED: Told("aligned", Severity.INFO, "the mount of an IMU was found and is in use", MOUNTED),
-    Code.ALIGNMENT_REFUSED: Told(
+    Code.ALIGNED: EventSpec("aligned", Severity.INFO, "the mount of an IMU was found and is in use", MOUNTED),
+    Code.ALIGNMENT_REFUSED: EventSpec(
         "alignment_refused",
         Severity.WARNING,
         "the alignment ended without a mount; the one before stays in use",
         words=alignment_refused,
     ),
-    Code.ALIGNMENT_DROPPED: Told(
+    Code.ALIGNMENT_DROPPED: EventSpec(
         "alignment_dropped", Severity.WARNING, "the mounts in use were forgotten", words=alignment_dropped
     ),
-    Code.IMU_EXCLUDED: Told(
+    Code.IMU_EXCLUDED: EventSpec(
         "imu_excluded",
         Severity.ERROR,
         "an IMU of the cluster is left out of the fused reading",
-        (("imu", int), ("reason", exclusion)),
+        (("imu", int), ("reason", exclusion_reason)),
     ),
-    Code.IMU_BACK: Told("imu_back", Severity.WARNING, "an IMU left out is used again", (("imu", int),)),
-    Code.BIAS_MOVED: Told(
+    Code.IMU_BACK: EventSpec("imu_back", Severity.WARNING, "an IMU left out is used again", (("imu", int),)),
+    Code.BIAS_MOVED: EventSpec(
         "bias_moved",
         Severity.WARNING,
         "at rest the gyroscope's bias was another one than the one in use, and is learnt again",
         (("moved_dps", float),),
     ),
-    Code.AIDING_DOUBTED: Told(
+    Code.AIDING_DOUBTED: EventSpec(
         "aiding_doubted",
         Severity.WARNING,
         "gyroscope and aiding differ by more than their noise, again and again; the yaw's variance says so",
         (("times", float), ("sigma_deg", float)),
     ),
-    Code.ENCODER_REVERSED: Told(
+    Code.ENCODER_REVERSED: EventSpec(
         "encoder_reversed",
         Severity.ERROR,
         "the encoder counts against the gyroscope, as fast; while the head turns its aidings are not used",
@@ -252,7 +252,7 @@ def take_events(events: Any) -> Iterator[PendingEvent]:
         yield line.name, line.severity, line.words(numbers) if line.words else arguments_of(line, numbers)
 
 
-def arguments_of(line: Told, numbers: Sequence[float]) -> dict[str, Scalar]:
+def arguments_of(line: EventSpec, numbers: Sequence[float]) -> dict[str, Scalar]:
     """Arguments of an event, each made of its number; without those whose number is none."""
     values = zip(line.arguments, numbers, strict=False)
     return {name: made(value) for (name, made), value in values if not math.isnan(value)}

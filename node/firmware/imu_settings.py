@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from node.errors import ConfigurationError
+from node.errors import NodeConfigurationError
 from telemetry.parameters import SensorParameters
 
 MAX_CONDITION: Final = 100.0  # of a matrix in any unit; a turned mount has 1
@@ -35,13 +35,13 @@ class ImuSettings:
             With the field, its range and what was given.
         """
         if not all(math.isfinite(x) and abs(x) < FARTHEST for x in self.offset):
-            raise ConfigurationError(f"imu.offset: expected x and y within +-{FARTHEST:g} m, got {self.offset}")
+            raise NodeConfigurationError(f"imu.offset: expected x and y within +-{FARTHEST:g} m, got {self.offset}")
         if not 1.0 / NOISIEST <= self.noise <= NOISIEST:
-            raise ConfigurationError(
+            raise NodeConfigurationError(
                 f"imu.noise: expected a factor of {1.0 / NOISIEST:g}..{NOISIEST:g}, got {self.noise}"
             )
         for name in ("gyroscope", "accelerometer"):
             sensor: SensorParameters = getattr(self, name)
             finite = all(map(math.isfinite, sensor.numbers()))
             if not finite or np.linalg.cond(np.array(sensor.matrix)) > MAX_CONDITION:
-                raise ConfigurationError(f"imu.{name}: expected finite numbers and a matrix that can be inverted")
+                raise NodeConfigurationError(f"imu.{name}: expected finite numbers and a matrix that can be inverted")

@@ -1,21 +1,20 @@
-"""What a node runs, by the name of its kernel."""
+"""What a node runs, by the name of its kernel: one table, to which a study may add a form of the filter of its own."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Final, NamedTuple, TypeAlias
 
-from node.firmware.settings import Kernel
+from node.errors import NodeConfigurationError
 from node.kernels.arithmetic.formats import Array
-from node.kernels.filter.float64.cycle import run_cycle
-from node.kernels.step.node_step import node_aiding, node_step
-from node.kernels.string.relay import offer_aiding
 
 
 class Loop(NamedTuple):
     """The cycle and the intake of aiding of a kernel, and the step of a node that holds both compiled in.
 
-    The signatures are those of ``node.kernels.filter.float64.cycle``, ``relay`` and ``step``.
+    The signatures are those of ``node.kernels.filter.float64.cycle.run_cycle``,
+    ``node.kernels.string.relay.offer_aiding``, ``node.kernels.step.node_step.node_step`` and ``node_aiding``.
     """
 
     run_cycle: Callable[..., int]
@@ -24,19 +23,47 @@ class Loop(NamedTuple):
     aiding: Callable[..., int]
 
 
-def kernel_of(kernel: Kernel, integers: Array | None = None) -> Loop:
-    """What a node with the kernel chosen runs; all but the default are loaded only when used.
+MakeLoop: TypeAlias = "Callable[[Array | None], Loop]"
 
-    ``integers`` is the memory of a node in integers, see ``node.kernels.step.fixed_node.FixedNode``.
-    """
-    if kernel == "float64":
-        return Loop(run_cycle, offer_aiding, node_step, node_aiding)
-    if kernel == "published":
-        from node.kernels.published import cycle as published
-        from node.kernels.published.step import published_aiding, published_step
 
-        return Loop(published.run_cycle, published.offer_aiding, published_step, published_aiding)
+def float64_loop(_: Array | None = None) -> Loop:
+    """The filter in floats."""
+    from node.kernels.filter.float64.cycle import run_cycle
+    from node.kernels.step.node_step import node_aiding, node_step
+    from node.kernels.string.relay import offer_aiding
+
+    return Loop(run_cycle, offer_aiding, node_step, node_aiding)
+
+
+def fixed_loop(integers: Array | None = None) -> Loop:
+    """The filter in integers of one node, whose memory they are; see ``node.kernels.step.fixed_node.FixedNode``."""
     from node.kernels.step.fixed_node import FixedNode
 
     fixed = FixedNode(integers)
     return Loop(fixed.run_cycle, fixed.offer_aiding, fixed.step, fixed.aiding)
+
+
+LOOPS: Final[dict[str, MakeLoop]] = {"float64": float64_loop, "fixed": fixed_loop}  # each is loaded only when used
+
+
+def kernel_of(kernel: str, integers: Array | None = None) -> Loop:
+    """What a node with the kernel chosen, one of ``LOOPS``, runs; ``integers`` is the memory of one in integers."""
+    return LOOPS[kernel](integers)
+
+
+@contextmanager
+def added_loop(kernel: str, make: MakeLoop) -> Iterator[None]:
+    """Let the nodes of this process run a further ``kernel`` meanwhile, as a study does.
+
+    Raises
+    ------
+    ConfigurationError
+        When there is a kernel of that name.
+    """
+    if kernel in LOOPS:
+        raise NodeConfigurationError(f"kernel: expected another name than {', '.join(LOOPS)}, got {kernel}")
+    LOOPS[kernel] = make
+    try:
+        yield
+    finally:
+        del LOOPS[kernel]

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from node.firmware.alignment import angles_of
+from node.firmware.alignment_orders import angles_of
 from node.firmware.inputs import RigContext
 from node.firmware.pending_event import PendingEvent
-from node.firmware.settings import TubeSettings
-from node.kernels.arithmetic.angles import from_binary, wrap
+from node.firmware.tube_settings import TubeSettings
+from node.kernels.arithmetic.angles import from_binary, wrap_angle
 from node.kernels.arithmetic.formats import DEG, Array
 from node.kernels.record.filter_record import Err
 from telemetry.messages import (
@@ -36,7 +36,7 @@ VAR_FLOOR = (0.001 * DEG) ** 2
 VAR_CEILING = 100.0  # rad^2, the largest that a message says; a yaw of that variance is any yaw
 
 
-class Reporter:
+class NodeReporter:
     """One node's words.
 
     Parameters
@@ -164,7 +164,7 @@ class Reporter:
             yaw=self.yaw,
             yaw_var=self.yaw_var,
             systematic_var=float(self._state["systematic_var"]) + below.std**2,
-            offset=wrap(below.angle),
+            offset=wrap_angle(below.angle),
             rate=float(self._state["now_rate"]),
             valid_at=context.rig_now,
             sequence=int(self._state["cycles"]),

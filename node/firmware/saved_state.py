@@ -16,7 +16,7 @@ import numpy as np
 
 from node.errors import SavedStateError
 from node.kernels.arithmetic.formats import Array
-from node.kernels.filter.resets import resume as resume_filter
+from node.kernels.filter.resets import resume_filter
 from node.kernels.record.node_record import KEPT, KEPT_SIZE, NODE, NODE_LAYOUT, forget_session
 
 # magic, version and format, checksum of the fields, generation, bytes of state and blob, when it was saved (s)
@@ -44,18 +44,20 @@ class Saved:
     saved_at: float
 
 
-def description(dtype: np.dtype[Any]) -> str:
+def dtype_description(dtype: np.dtype[Any]) -> str:
     """All that fixes the bytes of a record: names, places, types and shapes of its fields, and its size."""
     if dtype.subdtype is not None:
         base, shape = dtype.subdtype
-        return f"{description(base)}{list(shape)}"
+        return f"{dtype_description(base)}{list(shape)}"
     if dtype.fields is None:
         return dtype.str
-    fields = (f"{name}@{dtype.fields[name][1]}:{description(dtype.fields[name][0])}" for name in dtype.names or ())
+    fields = (
+        f"{name}@{dtype.fields[name][1]}:{dtype_description(dtype.fields[name][0])}" for name in dtype.names or ()
+    )
     return f"{{{','.join(fields)}}}{dtype.itemsize}"
 
 
-FIELDS: Final = zlib.crc32("".join(description(NODE[name]) for name in KEPT).encode())
+FIELDS: Final = zlib.crc32("".join(dtype_description(NODE[name]) for name in KEPT).encode())
 
 
 def layout_name(version: int = NODE_LAYOUT, fields: int = FIELDS) -> str:
@@ -63,7 +65,7 @@ def layout_name(version: int = NODE_LAYOUT, fields: int = FIELDS) -> str:
     return f"{version}-{fields:08x}"
 
 
-def pack(state: Array, blob: bytes, generation: int) -> bytes:
+def pack_state_slot(state: Array, blob: bytes, generation: int) -> bytes:
     """Bytes of one slot."""
     saved_at = float(state[0]["filter"]["now"])
     head = HEADER.pack(MAGIC, NODE_LAYOUT, FORMAT, FIELDS, generation, KEPT_SIZE, len(blob), saved_at)
@@ -71,7 +73,7 @@ def pack(state: Array, blob: bytes, generation: int) -> bytes:
     return head + CHECKSUM.pack(zlib.crc32(body, zlib.crc32(head))) + body
 
 
-def unpack(data: bytes) -> Saved:
+def unpack_state_slot(data: bytes) -> Saved:
     """Contents of one slot; what stands behind them, left by a longer save, is not looked at.
 
     Raises
@@ -97,11 +99,11 @@ def unpack(data: bytes) -> Saved:
     return Saved(np.frombuffer(record, NODE), body[state_size:], generation, saved_at)
 
 
-def resume(nodes: Array, configs: Array) -> bool:
+def resume_node(nodes: Array, configs: Array) -> bool:
     """Make a saved node ready for its first cycle after an outage of unknown length; whether it cut an alignment.
 
     What is learnt stays: constants, mounts, trust in the sensors, the twist. What belongs to the session goes, and
-    nobody knows what torque there was meanwhile. The configuration in use is again the one given, ``configs`` (1).
+    the torque meanwhile is unknown. The configuration in use is again the one given, ``configs`` (1).
     """
     forget_session(nodes)
     nodes["config"] = configs

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from node.errors import ConfigurationError
+from node.errors import NodeConfigurationError
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +27,10 @@ class SensorLimits:
         """
         for name, value in (("rate_range", self.rate_range), ("force_range", self.force_range)):
             if not (math.isfinite(value) and value > 0.0):
-                raise ConfigurationError(f"limits.{name}: expected a range above 0, got {value}")
+                raise NodeConfigurationError(f"limits.{name}: expected a range above 0, got {value}")
         for name, count in (("repeats_together", self.repeats_together), ("repeats_alone", self.repeats_alone)):
             if count < 0:
-                raise ConfigurationError(f"limits.{name}: expected 0 or more cycles, got {count}")
+                raise NodeConfigurationError(f"limits.{name}: expected 0 or more cycles, got {count}")
 
 
 USUAL_LIMITS = SensorLimits()

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from node.firmware.settings import Joint, PassedTube
-from node.kernels.arithmetic.angles import wrap
+from node.firmware.tube_settings import MakeUpAngle, PassedTube
+from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.string.twist import reaching_var
 from telemetry.messages import Aiding
 
 
-def across(aiding: Aiding, silent: Sequence[PassedTube], stiffness: float) -> Aiding:
+def aiding_across_silent(aiding: Aiding, silent: Sequence[PassedTube], stiffness: float) -> Aiding:
     """The aiding as the lowest of the ``silent`` tubes would have handed it on.
 
     A tube between adds its joints and its twist and changes nothing else (``node.kernels.string.relay``, scheme
@@ -23,10 +23,10 @@ def across(aiding: Aiding, silent: Sequence[PassedTube], stiffness: float) -> Ai
     stiffness : N m/rad, of each
     """
     for tube in reversed(silent):
-        drive = tube.drive_joint if aiding.hops == 0 else Joint()
+        drive = tube.drive_joint if aiding.hops == 0 else MakeUpAngle()
         aiding = replace(
             aiding,
-            offset=wrap(wrap(aiding.offset + drive.angle) + tube.lower_joint.angle),
+            offset=wrap_angle(wrap_angle(aiding.offset + drive.angle) + tube.lower_joint.angle),
             systematic_var=aiding.systematic_var + drive.std**2 + tube.lower_joint.std**2,
             torsion_var=float(reaching_var(aiding.torsion_var, aiding.torque, stiffness)),
             hops=aiding.hops + 1,

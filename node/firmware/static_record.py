@@ -21,7 +21,7 @@ MOVED = 3.0  # times the noise, the spread of a record that was not at rest
 def begin_record(recording: Any, seconds: object, command: int, *, standing: bool) -> str:
     """Begin with the next cycle of ``recording`` (of dtype ``RECORDING``); returns why not, or nothing.
 
-    A record that is being taken makes way: whoever orders anew no longer wants it, since what was before the order,
+    A record that is being taken makes way: a new order means that it is not wanted, since what was before the order,
     such as another attitude, would be in it.
     """
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not SHORTEST <= seconds <= LONGEST:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from node.firmware.settings import require
+from node.firmware.tube_settings import require_setting
 from node.kernels.arithmetic.formats import Array
 from node.kernels.string.drive_torque import DRIVE, LARGEST
 
@@ -29,10 +29,12 @@ class TorqueSettings:
             With the field, its range and what was given.
         """
         for name, torque in (("drilling", self.drilling), ("dead_band", self.dead_band)):
-            require(0.0 <= torque <= LARGEST, f"torque.{name}: expected 0..{LARGEST:g} N m, got {torque}")
+            require_setting(0.0 <= torque <= LARGEST, f"torque.{name}: expected 0..{LARGEST:g} N m, got {torque}")
         part = self.trapped_fraction
-        require(0.0 <= part <= 1.0, f"torque.trapped_fraction: expected 0..1, got {part}")
-        require(self.release_cycles >= 1, f"torque.release_cycles: expected 1 or more, got {self.release_cycles}")
+        require_setting(0.0 <= part <= 1.0, f"torque.trapped_fraction: expected 0..1, got {part}")
+        require_setting(
+            self.release_cycles >= 1, f"torque.release_cycles: expected 1 or more, got {self.release_cycles}"
+        )
 
 
 def drive_record(settings: TorqueSettings) -> Array:

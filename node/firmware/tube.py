@@ -9,14 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from node.firmware.alignment import alignment_in_use, order_alignment
-from node.firmware.block_trial import record_of, recorrect
+from node.firmware.alignment_orders import alignment_in_use, order_alignment
+from node.firmware.block_trial import record_of, recorrect_ring
 from node.firmware.event_table import take_events
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.kernel_choice import kernel_of
-from node.firmware.reporter import Reporter
-from node.firmware.settings import TubeSettings, crew_record
+from node.firmware.reporter import NodeReporter
 from node.firmware.static_record import begin_record, static_record
+from node.firmware.tube_settings import TubeSettings, settings_record
 from node.kernels.arithmetic.formats import DEG, Array
 from node.kernels.arithmetic.quantity import NONE
 from node.kernels.filter.modes import STATIC_BIAS
@@ -94,13 +94,13 @@ class Tube:
         self.config = self.node["config"]
         self.state, self._mount = self.node["filter"], self.node["mount"]
         self._down = tuple(nodes[f"down_{name}"] for name in ("systematic", "offset", "torsion"))  # arrays of one
-        self._crew = crew_record(settings, configs)
+        self._settings_record = settings_record(settings, configs)
         self._next_sequence = next_sequence
-        self.reporter = Reporter(settings, nodes, next_sequence, restored=restored)
+        self.reporter = NodeReporter(settings, nodes, next_sequence, restored=restored)
         self._restored, self._worth = restored, self._saved_yaw_worth()
         count = len(settings.imus)
         if count > 1:
-            begin_cluster(self.node, self._crew[0])
+            begin_cluster(self.node, self._settings_record[0])
         self._loop = kernel_of(settings.kernel, integers)
         own = [ParameterBlock(settings.tube, 0, imu.gyroscope, imu.accelerometer) for imu in settings.imus]
         self._corrections = np.zeros(1 + count, PARAMETERS) if corrections is None else corrections
@@ -120,7 +120,7 @@ class Tube:
             *(taken.data, 0, a.yaw, a.yaw_var, a.systematic_var, a.offset, a.rate, valid_local, a.sequence, a.hops),
             *(a.torque, a.torsion_var, a.under_torque, clock_var),
         )
-        if not self._loop.aiding(self.nodes, self._crew, taken) & ONWARD:
+        if not self._loop.aiding(self.nodes, self._settings_record, taken) & ONWARD:
             return None
         systematic_var, offset, torsion_var = self._down
         return Aiding(
@@ -147,13 +147,13 @@ class Tube:
         rows[0] = _row_of(reading)
         for k in range(1, len(rows)):
             rows[k] = _row_of(reading.others[k - 1]) if k <= len(reading.others) else math.nan
-        says = self._loop.step(self.nodes, self._crew, self._corrections, rows, self._moment)
+        says = self._loop.step(self.nodes, self._settings_record, self._corrections, rows, self._moment)
         return [] if says in (0, ADMITTED) else list(self.say(says, reading.end, context))
 
     @property
-    def crew(self) -> Array:
+    def settings_record(self) -> Array:
         """The settings as ``node_step`` takes them, one-element array of dtype ``SETTINGS``; they do not change."""
-        return self._crew
+        return self._settings_record
 
     def boot_event(self, rig_now: float) -> Event:
         """Report that the node started, and whether with its saved yaw."""
@@ -187,7 +187,7 @@ class Tube:
     def align(self, method: object, turns: object) -> str:
         """Find the tube's axis in the coming slow turns, or drop the offset in use; returns why not, or nothing."""
         if method == "none":
-            drop_alignment(self.node, self._crew[0], int(Reason.ORDERED))
+            drop_alignment(self.node, self._settings_record[0], int(Reason.ORDERED))
             return ""
         if self.state["mode"] == STATIC_BIAS:
             return "the static bias is not known yet"
@@ -205,7 +205,7 @@ class Tube:
     def prepare(self, block: ParameterBlock) -> None:
         """Forget what was learnt under the present block and would be wrong under ``block``."""
         if block.accelerometer != self.parameters.accelerometer:
-            drop_alignment(self.node, self._crew[0], int(Reason.OTHER_ACCELEROMETER))
+            drop_alignment(self.node, self._settings_record[0], int(Reason.OTHER_ACCELEROMETER))
         if block.gyroscope != self.parameters.gyroscope:
             if self.node["aligner"]["method"]:
                 refuse_alignment(self.node, int(Reason.OTHER_GYROSCOPE), 0, NONE, NONE)
@@ -215,7 +215,7 @@ class Tube:
 
     def use(self, block: ParameterBlock) -> None:
         """Correct readings by ``block`` from the next cycle on."""
-        recorrect(self.state, self.parameters, block, float(self.node["temperature"]))
+        recorrect_ring(self.state, self.parameters, block, float(self.node["temperature"]))
         self.parameters = block
         self.state["smoothing"] = 0
         self._corrections[0] = record_of(block)[0]

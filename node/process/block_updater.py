@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 
-from node.firmware.block_trial import Trial, Verdict, refusal, unfit
+from node.firmware.block_trial import Trial, TrialVerdict, refusal_reason, unfit_reason
 from node.firmware.inputs import ImuReading
 from node.firmware.tube import Tube
 from node.process.block_store import BlockStore
@@ -79,10 +79,10 @@ class BlockUpdater:
         verdict = self._trial.judge_reading(
             reading.rate, reading.force, reading.temperature, standing=tube.standing, quiet=tube.quiet
         )
-        if verdict is Verdict.WAIT:
+        if verdict is TrialVerdict.WAIT:
             return None
         block = self._trial.block
-        if verdict is Verdict.REFUSE:
+        if verdict is TrialVerdict.REFUSE:
             return self._refuse(block.sha256(), block.version, self._trial.reason)
         return self._apply(block)
 
@@ -132,7 +132,7 @@ class BlockUpdater:
             block = unpack_block(data)
         except DecodeError as error:
             return self._refuse(assembly.digest, assembly.version, str(error))
-        reason = refusal(block, self._tube.settings.tube, self._tube.parameters)
+        reason = refusal_reason(block, self._tube.settings.tube, self._tube.parameters)
         if block.version != assembly.version:
             reason = f"version: expected that of its segments, {assembly.version}, got {block.version}"
         if reason:
@@ -196,4 +196,4 @@ class BlockUpdater:
 
 def load_parameters(store: BlockStore, tube: int) -> ParameterBlock:
     """Block that a node starts with: the newest good one of its disk, or the identity."""
-    return store.load(lambda block: unfit(block, tube)) or ParameterBlock(tube, 0)
+    return store.load(lambda block: unfit_reason(block, tube)) or ParameterBlock(tube, 0)

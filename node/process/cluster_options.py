@@ -26,12 +26,12 @@ class ClusterRequest:
 
         Raises
         ------
-        ConfigurationError
+        NodeConfigurationError
             When options were given for different numbers of IMUs.
         CalibrationError
             When a file is not a calibration of its sensor.
         """
-        from node.errors import ConfigurationError
+        from node.errors import NodeConfigurationError
         from node.firmware.imu_settings import ImuSettings
 
         given = {
@@ -44,7 +44,7 @@ class ClusterRequest:
         counts = {name: count for name, count in given.items() if count}
         if len(set(counts.values())) > 1:
             told = ", ".join(f"--{name} {count} times" for name, count in counts.items())
-            raise ConfigurationError(f"imus: expected as many of each option as there are IMUs, got {told}")
+            raise NodeConfigurationError(f"imus: expected as many of each option as there are IMUs, got {told}")
         count = max(counts.values(), default=1)
         rows = zip(
             [(1e-3 * x, 1e-3 * y) for x, y in self.offsets or ((0.0, 0.0),) * count],

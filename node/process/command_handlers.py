@@ -18,7 +18,7 @@ SPECS = {spec.name: spec for spec in COMMANDS if spec.by is ObeyedBy.TUBE}
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class CommandOutcome:
     """Whether an order is obeyed, why not or what happens now, and what the table of commands promises."""
 
     done: bool
@@ -40,7 +40,7 @@ class CommandHandlers:
         self._tube = tube
         self._resend = resend
         self._timing = timing
-        self._handlers: dict[str, Callable[[Mapping[str, Any], int], Outcome]] = {
+        self._handlers: dict[str, Callable[[Mapping[str, Any], int], CommandOutcome]] = {
             name: getattr(self, name) for name in SPECS
         }
 
@@ -51,56 +51,56 @@ class CommandHandlers:
                 raise CommandError(f"expected {', '.join(SPECS)}, got {command.name!r:.40}")
             arguments = check_arguments(SPECS[command.name], command.arguments)
         except CommandError as error:
-            outcome = Outcome(False, str(error))
+            outcome = CommandOutcome(False, str(error))
         else:
             outcome = self._handlers[command.name](arguments, command.sequence)
         return Reply(
             self._tube.settings.tube, command.sequence, outcome.done, outcome.detail[:MAX_TEXT], outcome.values
         )
 
-    def take_survey(self, _arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+    def take_survey(self, _arguments: Mapping[str, Any], _sequence: int) -> CommandOutcome:
         """Measure the station again."""
         self._tube.take_survey()
-        return Outcome(True, "at the next settled cycle")
+        return CommandOutcome(True, "at the next settled cycle")
 
-    def static_record(self, arguments: Mapping[str, Any], sequence: int) -> Outcome:
+    def static_record(self, arguments: Mapping[str, Any], sequence: int) -> CommandOutcome:
         """Average raw readings at rest."""
         seconds = arguments["seconds"]
         if refused := self._tube.start_record(seconds, sequence):
-            return Outcome(False, refused)
-        return Outcome(True, "recording", {"seconds": seconds})
+            return CommandOutcome(False, refused)
+        return CommandOutcome(True, "recording", {"seconds": seconds})
 
-    def resend(self, arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+    def resend(self, arguments: Mapping[str, Any], _sequence: int) -> CommandOutcome:
         """Send surveys and static records of a range of numbers again."""
         if arguments["last"] < arguments["first"]:
-            return Outcome(False, f"last: expected at least {arguments['first']}, got {arguments['last']}")
+            return CommandOutcome(False, f"last: expected at least {arguments['first']}, got {arguments['last']}")
         sent, complete_from = self._resend(arguments["first"], arguments["last"])
-        return Outcome(True, values={"sent": sent, "complete_from": complete_from})
+        return CommandOutcome(True, values={"sent": sent, "complete_from": complete_from})
 
-    def parameters(self, _arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+    def parameters(self, _arguments: Mapping[str, Any], _sequence: int) -> CommandOutcome:
         """Name the parameter block in use."""
         block = self._tube.parameters
-        return Outcome(True, values={"version": block.version, "sha256": block.sha256().hex()})
+        return CommandOutcome(True, values={"version": block.version, "sha256": block.sha256().hex()})
 
-    def align(self, arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+    def align(self, arguments: Mapping[str, Any], _sequence: int) -> CommandOutcome:
         """Find the mount of the IMUs in the coming turns, or drop it."""
         method, turns = arguments["method"], arguments["turns"]
         if refused := self._tube.align(method, turns):
-            return Outcome(False, refused)
+            return CommandOutcome(False, refused)
         if method == "none":
-            return Outcome(True, "dropped", {"method": method})
-        return Outcome(True, "turn the string slowly", {"method": method, "turns": turns})
+            return CommandOutcome(True, "dropped", {"method": method})
+        return CommandOutcome(True, "turn the string slowly", {"method": method, "turns": turns})
 
-    def alignment(self, _arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+    def alignment(self, _arguments: Mapping[str, Any], _sequence: int) -> CommandOutcome:
         """Name the alignment in use."""
-        return Outcome(True, values=self._tube.alignment)
+        return CommandOutcome(True, values=self._tube.alignment)
 
-    def timing(self, _arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+    def timing(self, _arguments: Mapping[str, Any], _sequence: int) -> CommandOutcome:
         """Say how late the cycles start and how long their stages take."""
         if self._timing is None:
-            return Outcome(False, "expected a node with a clock of its own")
+            return CommandOutcome(False, "expected a node with a clock of its own")
         values: dict[str, Value] = {"cycles": self._timing.cycles, "overruns": self._timing.overruns}
         for stage, durations in self._timing.stages.items():
             if durations.count:
                 values |= {f"{stage.value}_p99": durations.quantile(0.99), f"{stage.value}_max": durations.largest}
-        return Outcome(True, values=values)
+        return CommandOutcome(True, values=values)

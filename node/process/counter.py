@@ -1,6 +1,6 @@
 """A boot counter on disk, replaced whole so that a cut leaves the old or the new number.
 
-A counter that is damaged or cannot be written does not end the process: the start gets a number by lot from a range
+A counter that is damaged or cannot be written does not end the process: the start gets a random number from a range
 that counting never reaches, so that no neighbour takes it for a start that it has seen.
 """
 
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from telemetry.runtime.disk import MACHINE, Disk, replace_file
 
-LOTS = 1 << 20  # numbers in LOTS..2 LOTS - 1 are by lot; an encoder's, shifted, still fit a sequence number
+LOTS = 1 << 20  # numbers in LOTS..2 LOTS - 1 are random; an encoder's, shifted, still fit a sequence number
 
 
 class BootCounter:
@@ -21,14 +21,14 @@ class BootCounter:
     Parameters
     ----------
     folder : where it is kept
-    lot : number below its argument by lot, for a start that cannot be counted
+    lot : random number below its argument, for a start that cannot be counted
     disk : that holds the folder
     is_new : a folder without a count is a new one, whose starts count from 1; otherwise the count may have been lost
 
     Attributes
     ----------
     boots : number of this start
-    fault : why it is by lot, or empty
+    fault : why it is random, or empty
     """
 
     def __init__(

@@ -61,7 +61,7 @@ def encoder(
     """
     from node.firmware.torque import TorqueSettings
     from node.process.drivers.choice import encoder_source
-    from node.process.host import run_encoder
+    from node.process.node_host import run_encoder
     from telemetry.messages import ENCODER
 
     own_time = ends.to_own_time(ENCODER, ("--counter", counter))

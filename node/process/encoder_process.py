@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from node.firmware.encoder import EncoderNode, EncoderSample
+from node.firmware.encoder_node import EncoderNode, EncoderSample
 from node.firmware.torque import TorqueSettings
 from node.process.counter import BootCounter
 from node.process.drivers.source import EncoderSource, SafeEncoder
@@ -37,9 +37,9 @@ class EncoderProcess(Process):
     reach : tubes away that its radio hears, see ``TubeSettings``
     disk : that holds the folder
     seals : what it says and believes under keys; None: everybody is believed
-    is_new : nobody has heard this encoder before. Otherwise a start that cannot be counted is numbered by lot: an epoch
+    is_new : never heard before on this rig. Otherwise a start that cannot be counted gets a random number: an epoch
         that came before would mix the depths of two times
-    lot : number below its argument by lot
+    lot : random number below its argument
 
     Raises
     ------

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Final
 
 from node.errors import SavedStateError
-from node.firmware.saved_state import Saved, pack, unpack
+from node.firmware.saved_state import Saved, pack_state_slot, unpack_state_slot
 from node.kernels.arithmetic.formats import Array
 from telemetry.runtime.disk import MACHINE, Disk
 
@@ -57,7 +57,7 @@ class Journal:
         self._newest, self._has_looked = None, True
         for place, slot in enumerate(self._slots):
             try:
-                found = unpack(self._disk.read(slot))
+                found = unpack_state_slot(self._disk.read(slot))
             except FileNotFoundError:
                 continue
             except (SavedStateError, OSError) as error:
@@ -84,7 +84,7 @@ class Journal:
         if not self._has_looked:
             self._look()
         self._generation += 1  # also of a save that fails: what it may have left must not pass for a later one
-        data = pack(state, blob, self._generation)
+        data = pack_state_slot(state, blob, self._generation)
         fault = OSError(errno.EIO, "saved state: expected a slot that can be written, got none", str(self._slots[0]))
         for place in self._places():
             try:
@@ -99,7 +99,7 @@ class Journal:
         raise fault
 
     def _look(self) -> None:
-        """Find the newest good slot before the first save, where nobody asked for its contents."""
+        """Find the newest good slot before the first save, where its contents were not loaded."""
         try:
             self.load()
         except SavedStateError:

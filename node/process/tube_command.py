@@ -23,7 +23,7 @@ def node(request: TubeRequest, ends: EndsRequest, place: PlaceRequest) -> None:
       borechain node --tube 2 --clock own --imu mpu6500:1 --upper can:can0 --lower can:can1
     """
     from node.process.drivers.choice import imu_source
-    from node.process.host import run_node
+    from node.process.node_host import run_node
 
     sources = request.imus.sources
     if any(source.startswith("mpu6500") for source in sources):

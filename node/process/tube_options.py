@@ -25,7 +25,7 @@ from telemetry.runtime.process_options import (
 from telemetry.runtime.typed_options import gather_options
 
 if TYPE_CHECKING:
-    from node.firmware.settings import TubeSettings
+    from node.firmware.tube_settings import TubeSettings
 
 FILE = click.Path(path_type=Path, dir_okay=False)
 SCHEMES = ("forward", "estimate", "intersection")
@@ -40,7 +40,7 @@ class TubeRequest:
     lower_joint_deg: float
     joint_std_deg: float
     mount_std_deg: float
-    kernel: Literal["float64", "fixed", "published"]
+    kernel: Literal["float64", "fixed"]
     scheme: str
     stiffness_nm: float
     torsion: Literal["gate", "variance"]
@@ -52,17 +52,17 @@ class TubeRequest:
 
         Raises
         ------
-        ConfigurationError, CalibrationError
+        NodeConfigurationError, CalibrationError
             When a setting is outside its range, or a file is not a calibration.
         """
-        from node.firmware.settings import Joint, TubeSettings
+        from node.firmware.tube_settings import MakeUpAngle, TubeSettings
         from node.kernels.record.filter_record import Scheme
 
         joint_std = math.radians(self.joint_std_deg)
         return TubeSettings(
             tube=self.tube,
-            drive_joint=Joint(math.radians(self.drive_joint_deg), joint_std),
-            lower_joint=Joint(math.radians(self.lower_joint_deg), joint_std),
+            drive_joint=MakeUpAngle(math.radians(self.drive_joint_deg), joint_std),
+            lower_joint=MakeUpAngle(math.radians(self.lower_joint_deg), joint_std),
             mount_std=math.radians(self.mount_std_deg),
             scheme=Scheme[self.scheme.upper()],
             kernel=self.kernel,
@@ -96,10 +96,10 @@ tube_options = gather_options(
     ),
     click.option(
         "--kernel",
-        type=click.Choice(["float64", "fixed", "published"]),
+        type=click.Choice(["float64", "fixed"]),
         default="float64",
         show_default=True,
-        help="Filter in floating point, in integers, or in its published form (for comparison only).",
+        help="Filter in floating point or in integers.",
     ),
     click.option(
         "--scheme",

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from node.errors import ConfigurationError
+from node.errors import NodeConfigurationError
 from node.firmware.inputs import RigContext
-from node.firmware.saved_state import resume
-from node.firmware.settings import TubeSettings
-from node.firmware.silent_tubes import across
+from node.firmware.saved_state import resume_node
+from node.firmware.silent_tubes import aiding_across_silent
 from node.firmware.tube import Tube
+from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import Array
 from node.kernels.filter.resets import forget_bias, lose_tilt
 from node.kernels.record.filter_record import Scheme, default_config
@@ -98,9 +98,9 @@ class TubeProcess(Process):
         self._timing = timing
         self._overrun_told = -math.inf
         if len(imus) not in (0, len(settings.imus)):
-            raise ConfigurationError(f"imus: expected {len(settings.imus)} sources, got {len(imus)}")
+            raise NodeConfigurationError(f"imus: expected {len(settings.imus)} sources, got {len(imus)}")
         if seals is not None and settings.scheme is not Scheme.FORWARD:
-            raise ConfigurationError(f"scheme: expected forward with keys, got {settings.scheme.name.lower()}")
+            raise NodeConfigurationError(f"scheme: expected forward with keys, got {settings.scheme.name.lower()}")
         for imu in imus:
             imu.start()
         self._sources = imus
@@ -115,7 +115,7 @@ class TubeProcess(Process):
         self._looked_at_drops = -math.inf
         saved = self._saver.load()
         self.nodes, telemetry = saved if saved else (new_node(self.config), None)
-        self._cut = resume(self.nodes, self.config) if saved else False
+        self._cut = resume_node(self.nodes, self.config) if saved else False
         store = BlockStore(folder, disk)
         parameters = load_parameters(store, settings.tube)
         self._fallback = "; ".join(store.faults)
@@ -246,8 +246,8 @@ class TubeProcess(Process):
             self._timing.add_duration(CycleStage.AIDING, clock.rig_from_local(now) - aiding.valid_at)
         silent = self.endpoint.skipped
         if silent > len(self.settings.above):
-            return  # over joints that nobody told this node of
-        aiding = across(aiding, self.settings.above[:silent], self.settings.stiffness)
+            return  # over joints that this node was not told of
+        aiding = aiding_across_silent(aiding, self.settings.above[:silent], self.settings.stiffness)
         valid_local = clock.local_from_rig(aiding.valid_at)
         if math.isfinite(clock.stepped):
             valid_local -= clock.stepped  # the cycle learns of the step, and moves what waits for it

@@ -1,6 +1,6 @@
 """A chunk of a campaign: some runs one after another, as columns of numbers.
 
-Whoever computes a chunk, a process of this machine or a worker of a cluster, gets the same numbers: they depend on the
+Every computer of a chunk, a process of this machine or a worker of a cluster, gets the same numbers: they depend on the
 scenario and the numbers of the runs alone.
 """
 
@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from node.firmware.block_trial import record_of
 from node.kernels.arithmetic.formats import Array
-from node.kernels.step.address import firmware
+from node.kernels.step.address import firmware_addresses
 from sim.campaign.course import ANY_SEED, Course, course_of
 from sim.campaign.draws import Draws, draws_of, fresh_nodes, noise_of, tubes_of
 from sim.campaign.drill import CODES, STATE_OF, SURVEY, drill
@@ -118,7 +118,7 @@ class Campaign:
         epochs = np.zeros((len(self.course.epochs), count), STATE_OF)
         key = np.array([seed & 0xFFFFFFFF, seed >> 32], np.uint64)
         counts = np.zeros((count, CODES), np.int64)
-        step, aid = firmware()
+        step, aid = firmware_addresses()
         made = drill(
             step,
             aid,

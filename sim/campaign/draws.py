@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from node.firmware.settings import crew_record
+from node.firmware.tube_settings import settings_record
 from node.kernels.arithmetic.formats import PERIOD, Array
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import new_node
@@ -94,6 +94,6 @@ def fresh_nodes(world: World) -> tuple[Array, Array]:
     for name, value in world.scenario.file.node.tuning.items():
         config[0][name] = value
     tubes = range(1, world.scenario.tubes + 1)
-    crews = np.concatenate([crew_record(world.tube_settings(tube), config) for tube in tubes])
+    crews = np.concatenate([settings_record(world.tube_settings(tube), config) for tube in tubes])
     crews["state_every"] = NEVER
     return np.repeat(new_node(config), len(tubes)), crews

@@ -1,7 +1,7 @@
 """What a tube of a rough world reads in a cycle of a campaign: the mean of the frames that its driver finds.
 
 The driver also tells what its window shows of the cycle before and of the eighths of its own, as
-``node.process.drivers.parts`` makes it of frames; here it is made of sums over frames.
+``node.process.drivers.fifo_window`` makes it of frames; here it is made of sums over frames.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from node.kernels.arithmetic.jit import kernel
 from node.kernels.record.filter_record import PARTS
 from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, SATURATED, SPLIT, TEMPERATURE
 from node.kernels.sensors.correction import USUAL
-from node.process.drivers.parts import LEAST
+from node.process.drivers.fifo_window import LEAST
 from sim.campaign.field import FELT, FINER, MOVED, SAME, SUMS
 from sim.campaign.philox import normals, uniforms
 from sim.campaign.sensors import cross_hop, wander_on

@@ -1,7 +1,8 @@
 """Segments on a UDP port of this machine, for controllers of python-can's interface ``borechain_loopback``.
 
 A controller's first datagram is ``ATTACH``, a byte of flags and the name of its segment; a segment exists as long as
-somebody is on it. Then frames as Linux lays them out, and a few bytes for the rest (``telemetry.media.can_loopback``).
+it has a controller. The next ones carry frames in the layout of Linux, and a few bytes for the rest
+(``telemetry.media.can_loopback``).
 """
 
 from __future__ import annotations
@@ -88,12 +89,12 @@ class CanHub:
         self._wake_out.send(b"w")
 
     def close(self) -> None:
-        """Let the port go."""
+        """Close the port."""
         for endpoint in (self._socket, self._wake_in, self._wake_out):
             endpoint.close()
 
     def _turn(self) -> float:
-        """Take what has arrived and advance every segment; returns how long nothing is due (s)."""
+        """Take what has arrived and advance every segment; returns the time (s) until something is due."""
         with self._lock:
             while (arrival := self._receive()) is not None:
                 self._on_datagram(*arrival)
@@ -113,7 +114,7 @@ class CanHub:
             return self._receive()
 
     def _bury(self) -> None:
-        """Take controllers away whose processes have ended."""
+        """Remove controllers whose processes have ended."""
         with contextlib.suppress(BlockingIOError):
             while True:
                 _, _, _, address = self._socket.recvmsg(LARGEST_DATAGRAM, 512, socket.MSG_ERRQUEUE)
@@ -144,7 +145,7 @@ class CanHub:
         wire = self.wires.setdefault(segment, CanWire(self._rates))
         wire.attach(address, fd=bool(flags & FLAG_FD), hears_itself=bool(flags & FLAG_OWN))
         self._segment_of[address], self._counts[address] = segment, 0
-        self._due[segment] = -math.inf  # somebody may have waited for a listener
+        self._due[segment] = -math.inf  # a frame may have waited for a listener
         self._put(ATTACHED, address)
 
     def _detach(self, address: Address) -> None:
@@ -158,7 +159,7 @@ class CanHub:
             del self.wires[segment], self._due[segment]
 
     def _advance(self, segment: str, now: float) -> None:
-        """Hand out what the segment has for its controllers."""
+        """Deliver the frames that a segment has for its controllers."""
         wire = self.wires.get(segment)
         if wire is None:
             return  # its last controller went meanwhile

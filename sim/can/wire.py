@@ -1,8 +1,8 @@
 """One CAN segment as a pure state machine: who may send, how long it takes, who hears it, who is thrown off.
 
-Times are seconds of the caller's clock. A frame that nobody acknowledges waits, as a controller would repeat it, until
-somebody is attached. Error counters follow ISO 11898-1: a transmission that fails costs 8, one that succeeds gives back
-1, 128 is error passive, over 255 is bus-off. A missing acknowledgement brings nobody further than error passive.
+Times are seconds of the caller's clock. An unacknowledged frame waits, as a controller would repeat it, until one more
+is attached. Error counters follow ISO 11898-1: a transmission that fails costs 8, one that succeeds gives back
+1, 128 is error passive, over 255 is bus-off. A missing acknowledgement brings no controller further than error passive.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ class WireController:
     waiting: deque[tuple[float, CanFrame]] = field(default_factory=deque)  # since when, what
     errors: int = 0  # transmit error counter
     is_off: bool = False
-    unacknowledged: bool = False  # its first frame was sent and nobody acknowledged it
+    unacknowledged: bool = False  # its first frame was sent and not acknowledged
 
     @property
     def state(self) -> str:
-        """``active``, ``passive`` or ``off``, as the error counter says."""
+        """``active``, ``passive`` or ``off``, by the error counter."""
         return "off" if self.is_off else "passive" if self.errors >= PASSIVE else "active"
 
 
 @dataclass(frozen=True, slots=True)
 class Transmission:
-    """What is on the wire."""
+    """The transmission on the wire."""
 
     senders: tuple[Hashable, ...]
     frame: CanFrame
@@ -59,7 +59,7 @@ class CanWire:
     """A segment and its controllers.
 
     ``disturbed`` transmissions fail from now on and ``is_cut`` parts all controllers from each other: plain fields, to
-    be switched by whoever tests.
+    be switched by tests.
 
     Parameters
     ----------
@@ -78,15 +78,15 @@ class CanWire:
         self._current: Transmission | None = None
 
     def attach(self, name: Hashable, *, fd: bool = True, hears_itself: bool = True) -> None:
-        """Join a controller."""
+        """Attach a controller."""
         self.controllers[name] = WireController(fd, hears_itself)
 
     def detach(self, name: Hashable) -> None:
-        """Take a controller away; what waits in it is gone."""
+        """Detach a controller; its waiting frames are lost."""
         self.controllers.pop(name, None)
 
     def restart(self, name: Hashable) -> None:
-        """Have a controller that is bus-off take part again."""
+        """Restart a controller that is bus-off."""
         controller = self.controllers[name]
         controller.errors, controller.is_off = 0, False
 
@@ -100,7 +100,7 @@ class CanWire:
         return True
 
     def due(self) -> float:
-        """When ``advance`` has something to do next (s), infinite if never."""
+        """Time (s) at which ``advance`` has something to do next, infinite if never."""
         if self._current is not None:
             return self._current.end
         earliest = math.inf
@@ -110,7 +110,7 @@ class CanWire:
         return max(earliest, self._idle_at)
 
     def advance(self, now: float) -> list[Delivery]:
-        """Everything that controllers get until ``now``, in order."""
+        """Deliver everything that controllers get until ``now`` (s), in order."""
         deliveries: list[Delivery] = []
         while (due := self.due()) <= now:
             if self._current is None:
@@ -121,7 +121,7 @@ class CanWire:
         return deliveries
 
     def _is_able(self, name: Hashable, one: WireController) -> bool:
-        """Whether a controller with something to send may: not one that has learnt that it is alone."""
+        """Return whether a controller with a waiting frame may send: not one that has learnt that it is alone."""
         return not one.is_off and not (one.unacknowledged and not self._listeners(name))
 
     def _listeners(self, *senders: Hashable) -> list[Hashable]:
@@ -131,7 +131,7 @@ class CanWire:
         return [name for name, c in self.controllers.items() if name not in senders and not c.is_off]
 
     def _begin(self, start: float, deliveries: list[Delivery]) -> Transmission | None:
-        """Arbitrate among those who wait at ``start``; None when the winner is alone."""
+        """Arbitrate among the controllers that wait at ``start`` (s); None when the winner is alone."""
         firsts = {
             name: one.waiting[0][1]
             for name, one in self.controllers.items()

@@ -22,7 +22,7 @@ SHORTEST = 1.0  # s
 
 
 class Faulty(Protocol):
-    """What a fault may touch."""
+    """Interface of a rig to its faults."""
 
     world: FaultyWorld
     channel: FaultyChannel
@@ -32,25 +32,25 @@ class Faulty(Protocol):
         """Rig time (s) of the truth."""
 
     def cut(self, address: int) -> None:
-        """Power off."""
+        """Cut the power of a process."""
 
     def start(self, address: int, tube: int | None = None) -> None:
-        """Power on, where it was cut; another ``tube`` in this place has a blank disk and its own settings."""
+        """Power a process on if it was cut; another ``tube`` in this place has a blank disk and its own settings."""
 
     def freeze(self, address: int) -> None:
-        """A process gets no events; frames wait for it."""
+        """Freeze a process: it gets no events, and frames wait for it."""
 
     def thaw(self, address: int) -> None:
-        """It gets what waits."""
+        """Thaw a process: it gets what waits."""
 
     def disk(self, address: int) -> FaultyDisk:
-        """What a process keeps."""
+        """Return the disk of a process."""
 
     def inject(self, address: int, side: Side, frame: bytes) -> None:
-        """A frame from nowhere at an end of a process."""
+        """Inject a frame at an end of a process."""
 
     def send_depth(self, payload: bytes) -> None:
-        """Bytes on the key of the depth."""
+        """Publish bytes on the key of the depth."""
 
 
 Act = Callable[[Faulty], None]
@@ -69,7 +69,7 @@ Draw = Callable[[np.random.Generator, float, float], list[Step]]
 
 @dataclass(frozen=True, slots=True)
 class FaultKind:
-    """One kind: what happens in words, its steps between two rig times (s), and within what time (s) all is well again.
+    """One kind: its effect in words, its steps between two rig times (s), and the time (s) until all is well again.
 
     Well is what the crew is told of all that was lost, and what can be repaired is.
     """
@@ -83,13 +83,13 @@ class FaultKind:
 def draw_interval(
     random: np.random.Generator, begin: float, end: float, shortest: float, longest: float
 ) -> tuple[float, float]:
-    """Begin and end (s) of something that lasts so long and is over by ``end``."""
+    """Draw begin and end (s) of an interval of a length between two limits (s) that is over by ``end``."""
     at = float(random.uniform(begin, end - SHORTEST))
     return at, min(at + float(random.uniform(shortest, longest)), end)
 
 
 def lasting_fault(shortest: float, longest: float, begin_act: Act, end_act: Act) -> Draw:
-    """One act, and another that takes it back."""
+    """Draw of a fault with one act at its begin and one that takes it back."""
 
     def draw(random: np.random.Generator, begin: float, end: float) -> list[Step]:
         on, off = draw_interval(random, begin, end, shortest, longest)
@@ -99,7 +99,7 @@ def lasting_fault(shortest: float, longest: float, begin_act: Act, end_act: Act)
 
 
 def momentary_fault(act: Callable[[Faulty, np.random.Generator], None]) -> Draw:
-    """One act, with draws of its own."""
+    """Draw of a fault of one act, with draws of its own."""
 
     def draw(random: np.random.Generator, begin: float, end: float) -> list[Step]:
         at = float(random.uniform(begin, end))
@@ -110,10 +110,10 @@ def momentary_fault(act: Callable[[Faulty, np.random.Generator], None]) -> Draw:
 
 
 def own_stream(random: np.random.Generator) -> np.random.Generator:
-    """A stream that goes on by itself, whatever else is drawn."""
+    """Return an independent stream, seeded by one draw."""
     return np.random.Generator(np.random.Philox(int(random.integers(2**62))))
 
 
 def drawn_tube(random: np.random.Generator) -> int:
-    """One of the tubes."""
+    """Draw one of the tubes."""
     return int(random.choice(TUBES))

@@ -56,7 +56,7 @@ class FaultyDisk:
     writes_left: int = -1
     files: dict[str, File] = field(default_factory=dict)
     backups: list[bytes] = field(default_factory=list)  # images of the database, the newest last
-    handled: int = 0  # times that somebody but the process has changed a file
+    handled: int = 0  # changes of a file from outside the process
     _kept_names: dict[str, File] = field(default_factory=dict)
     _changes: list[NameChange] = field(default_factory=list)
     _numbers: int = 0
@@ -112,7 +112,7 @@ class FaultyDisk:
         self._changes.append(NameChange(((path.name, None),)))
 
     def make_folder(self, folder: Path) -> None:
-        """Nothing: every folder is there, and a disk that refuses does not mind."""
+        """Do nothing: every folder is there, even on a disk that refuses."""
 
     def identity(self, path: Path) -> int:
         """Number of the file that has this name; 0 where there is none."""
@@ -128,7 +128,7 @@ class FaultyDisk:
         return connection
 
     def cut(self) -> None:
-        """The power goes: what was not forced is lost, or in part, or is there."""
+        """Cut the power: what was not forced is lost, kept in part, or kept."""
         self.writes_left = -1
         if self._open is not None:
             self._open.abandon()
@@ -143,7 +143,7 @@ class FaultyDisk:
                 file.kept = bytes(file.seen)
 
     def replace(self, name: str, data: bytes | None) -> None:
-        """Whoever has the disk in his hands gives a file these bytes, or removes it."""
+        """Replace a file's bytes from outside the process; None removes the file."""
         self.handled += 1
         if data is None:
             self.files.pop(name, None)
@@ -157,7 +157,7 @@ class FaultyDisk:
         return {name: bytes(self.files[name].seen) for name in names}
 
     def copied(self, random: np.random.Generator) -> FaultyDisk:
-        """The same disk after a cut, with draws of its own."""
+        """Return the disk as it is after a cut, with a random stream of its own."""
         disk = FaultyDisk(random)
         for name, file in self._kept_names.items():
             disk.replace(name, file.kept)
@@ -166,7 +166,7 @@ class FaultyDisk:
 
     @property
     def size(self) -> int:
-        """Bytes that are held: of every file what is read and what is kept, and the backups."""
+        """Bytes held: of every file what is read and what is kept, and the backups."""
         files = {id(file): file for file in (*self.files.values(), *self._kept_names.values())}
         return sum(len(file.seen) + len(file.kept) for file in files.values()) + sum(map(len, self.backups))
 
@@ -179,7 +179,7 @@ class FaultyDisk:
         return self._kept_names[name].kept if name in self._kept_names else b""
 
     def keep_image(self, name: str, image: bytes) -> None:
-        """A commit of the database that is on the disk."""
+        """Keep the image of the database that a commit wrote."""
         if self.files[name].kept:
             self.backups = [*self.backups[1 - KEPT_BACKUPS :], self.files[name].kept]
         self.files[name].seen[:] = image
@@ -187,7 +187,7 @@ class FaultyDisk:
         self._kept_names[name] = self.files[name]
 
     def closed(self) -> None:
-        """The database was closed."""
+        """Note that the database was closed."""
         self._open = None
 
     def refuse_database(self) -> None:
@@ -214,7 +214,7 @@ class FaultyDisk:
         return File(bytearray(data), data, self._numbers)
 
     def _spend(self, path: Path, *, torn: bool = False) -> bool:
-        """One change more; whether the power goes in this one, which may have been made in part."""
+        """Count a change; returns whether the power goes in the middle of it; raises where it cannot be ``torn``."""
         if self.refusal:
             raise OSError(self.refusal, os.strerror(self.refusal), str(path))
         if self.writes_left < 0:
@@ -232,7 +232,7 @@ class FaultyDisk:
                 self._kept_names[name] = file
 
     def _torn(self, file: File) -> bytes:
-        """Each sector as it was or as it is; of what was added a first part."""
+        """Return the bytes after a cut: each sector old or new, and a first part of what was added."""
         if self.random.random() < 0.3:
             return bytes(file.seen)
         size = int(self.random.integers(len(file.kept), max(len(file.seen), len(file.kept)) + 1))
@@ -251,7 +251,7 @@ class MemoryDatabase(sqlite3.Connection):
     _name: str
 
     def begin_on(self, disk: FaultyDisk, name: str) -> None:
-        """Take the image that the disk has of the file."""
+        """Load the image of the file that the disk has."""
         self._disk, self._name = disk, name
         image = bytes(disk.files[name].seen) if name in disk.files else b""
         if image:
@@ -261,7 +261,7 @@ class MemoryDatabase(sqlite3.Connection):
             disk.make_empty(name)
 
     def abandon(self) -> None:
-        """The power is gone: nothing more of this connection reaches the disk."""
+        """Abandon the connection at a power cut: nothing more of it reaches the disk."""
         self._disk = None
 
     def commit(self) -> None:

@@ -36,12 +36,12 @@ class FaultyStepper(InProcessStepper):
         self._missed: dict[int, int] = {}
 
     def freeze(self, address: int) -> None:
-        """Give a process no events."""
+        """Freeze a process: it gets no events."""
         self._frozen.setdefault(address, deque(maxlen=WAITING))
         self._missed[address] = 0
 
     def thaw(self, address: int) -> None:
-        """Give it what waits, with its next event."""
+        """Thaw a process: it gets what waits with its next event."""
         if address in self._frozen:
             self._thawing[address] = self._frozen.pop(address)
 
@@ -60,10 +60,10 @@ class FaultyStepper(InProcessStepper):
                 except PowerCutError:
                     self._on_cut(address)
                 except BorechainError:
-                    continue  # it ended with a line; whoever starts processes tries again
+                    continue  # it ended with an error; the next start is tried later
 
     def wait_for(self, address: int, *, alive: bool, timeout: float) -> bool:
-        """True: the world waits for nobody."""
+        """Return True at once: the world waits for no process."""
         del address, alive, timeout
         return True
 

@@ -61,13 +61,13 @@ class FaultyWorld(World):
         return cls(scenario_of(tables), seed)
 
     def healthy(self) -> FaultyWorld:
-        """The same world without faults; what has been worked out is shared."""
+        """Return the world without faults; computed values are shared."""
         world = copy.copy(self)
         world._heal()
         return world
 
     def forget(self) -> None:
-        """Drop what was worked out for times that will not come again."""
+        """Drop computed values of times that will not come again."""
         self._depths.clear()
         self._counted.clear()
 
@@ -83,16 +83,16 @@ class FaultyWorld(World):
         self.depth_hidden = False
 
     def let_drift(self, address: int, t: float, rate: float) -> None:
-        """Have the clock of a process run fast from rig time ``t`` (s) of the truth on, by ``rate`` s a second.
+        """Let the clock of a process run fast by ``rate`` s/s from rig time ``t`` (s) of the truth on.
 
-        What it has gained by a drift of before it keeps: a clock does not run backwards.
+        It keeps what it has gained by an earlier drift: a clock does not run backwards.
         """
         since, before = self.drifts.get(address, (t, 0.0))
         self.jumps[address] = self.jumps.get(address, 0.0) + before * max(t - since, 0.0)
         self.drifts[address] = (t, rate)
 
     def local_clock(self, address: int, t: float) -> float:
-        """What the clock of a process shows at rig time ``t`` (s) of the truth."""
+        """Return the time (s) that the clock of a process shows at rig time ``t`` (s) of the truth."""
         shown = t - self.zero if address == ENCODER else super().local_clock(address, t)
         if address in self.drifts:
             since, rate = self.drifts[address]

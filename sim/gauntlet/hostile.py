@@ -18,7 +18,7 @@ STATE = ("slot-*",)
 
 
 def inject_garbage(rig: Faulty, random: np.random.Generator) -> None:
-    """Random bytes come at every port and key."""
+    """Inject random bytes at every port and key."""
     for _ in range(20):
         noise = random.bytes(int(random.integers(0, 300)))
         rig.send_depth(noise)
@@ -27,7 +27,7 @@ def inject_garbage(rig: Faulty, random: np.random.Generator) -> None:
 
 
 def forged_frames(rig: Faulty, random: np.random.Generator) -> None:
-    """A neighbour that never was names a hop count beyond every string, and receipts what nobody stored."""
+    """Send as a forged neighbour a hop count beyond every string, and receipts of messages that were not stored."""
     tube = drawn_tube(random)
     link = HopLink(ENCODER, int(random.integers(1, 1000)))
     link.send_best_effort(encode(Hello(ENCODER, 7, int(random.integers(-1, 252)), Mode.BOOT, 1.0)), "hello")
@@ -37,7 +37,7 @@ def forged_frames(rig: Faulty, random: np.random.Generator) -> None:
 
 
 def wild_numbers(rig: Faulty, random: np.random.Generator) -> None:
-    """Messages of the right shape with the largest numbers that the format allows come from above."""
+    """Inject messages of the right shape with the largest numbers that the format allows, from above."""
     tube = drawn_tube(random)
     link = HopLink(ENCODER, int(random.integers(1, 1000)))
     aiding = Aiding(0.0, 1e-12, 0.0, 0.0, 0.0, float(random.uniform(0.0, 1e6)), int(random.integers(2**40)), 0)
@@ -48,13 +48,13 @@ def wild_numbers(rig: Faulty, random: np.random.Generator) -> None:
 
 
 def replay_frames(rig: Faulty, random: np.random.Generator) -> None:
-    """Frames that were recorded come again, at the port they were for."""
+    """Inject recorded frames again, at the port they were for."""
     for frame, address, side in _recorded(rig, random):
         rig.inject(address, side, frame)
 
 
 def splice_frames(rig: Faulty, random: np.random.Generator) -> None:
-    """Payloads of recorded frames come under the header of another frame of the same port."""
+    """Inject payloads of recorded frames under the header of another frame of the same port."""
     recorded = _recorded(rig, random)
     for (frame, address, side), (other, _, _) in pairwise(recorded):
         one, two = parse_frame(frame), parse_frame(other)
@@ -63,7 +63,7 @@ def splice_frames(rig: Faulty, random: np.random.Generator) -> None:
 
 
 def second_ground(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """A second base station speaks to the encoder in spite of the lease."""
+    """Steps in which a second base station speaks to the encoder in spite of the lease."""
     at, until = draw_interval(random, begin, end, 3.0, 20.0)
     link = HopLink(BASE, int(random.integers(1, 2**31)))
 
@@ -75,7 +75,7 @@ def second_ground(random: np.random.Generator, begin: float, end: float) -> list
 
 
 def memory_lost_with_old_receipts(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """A node loses its saved state, and what was sent to it before arrives again."""
+    """Steps in which a node loses its saved state, and frames sent to it before arrive again."""
     tube = drawn_tube(random)
     off, on = draw_interval(random, begin, end, 1.0, 10.0)
     old: list[bytes] = []
@@ -101,7 +101,7 @@ def memory_lost_with_old_receipts(random: np.random.Generator, begin: float, end
 
 
 def _recorded(rig: Faulty, random: np.random.Generator) -> list[tuple[bytes, int, Side]]:
-    """Frames of one port, drawn, with the port that they were for."""
+    """Draw a port and return its recorded frames with the port that they were for."""
     chain = (BASE, ENCODER, *sorted(TUBES, reverse=True))
     ports = sorted(rig.channel.overheard)
     if not ports:

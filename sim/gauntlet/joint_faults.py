@@ -19,7 +19,7 @@ TOP_JOINT = {(ENCODER, Side.LOWER), *((tube, Side.UPPER) for tube in TUBES)}
 
 
 def disturb_frames(**rates: float) -> Draw:
-    """Frames suffer for a while."""
+    """Draw of a fault that disturbs frames at these rates for a while."""
 
     def set_rates(rig: Faulty) -> None:
         for name, rate in rates.items():
@@ -33,7 +33,7 @@ def disturb_frames(**rates: float) -> Draw:
 
 
 def sever_joint(*, both_ways: bool) -> Draw:
-    """Nothing passes the top joint, or nothing downward."""
+    """Draw of a fault that lets nothing pass the top joint, both ways or downward."""
     ends = TOP_JOINT if both_ways else {(ENCODER, Side.LOWER)}
     return lasting_fault(
         2.0,
@@ -44,7 +44,7 @@ def sever_joint(*, both_ways: bool) -> Draw:
 
 
 def asymmetric_loss(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """One port loses nearly all it sends, the other end is heard well."""
+    """Steps in which one port loses nearly all it sends while the other end is heard well."""
     port = PORTS[int(random.integers(len(PORTS)))]
     rate = float(random.uniform(0.6, 0.98))
 
@@ -55,7 +55,7 @@ def asymmetric_loss(random: np.random.Generator, begin: float, end: float) -> li
 
 
 def slow_process(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """What a process sends comes late."""
+    """Steps in which everything that a process sends comes late."""
     address, late = int(random.choice(EVERYBODY)), float(random.uniform(0.1, 1.5))
     ports = {port: late for port in PORTS if port[0] == address}
 
@@ -67,7 +67,7 @@ def slow_process(random: np.random.Generator, begin: float, end: float) -> list[
 
 
 def clock_jumps(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """The clock of a process jumps ahead, and stays there."""
+    """Steps in which the clock of a process jumps ahead, for good."""
     address = int(random.choice(EVERYBODY))
     by = float(random.uniform(0.2, 20.0))
     at = float(random.uniform(begin, end))
@@ -75,7 +75,7 @@ def clock_jumps(random: np.random.Generator, begin: float, end: float) -> list[S
 
 
 def clock_drifts(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """The clock of a process begins to run up to 0.1 % fast or slow."""
+    """Steps in which the clock of a process begins to run up to 0.1 % fast or slow."""
     address, rate = int(random.choice(EVERYBODY)), float(random.uniform(-1e-3, 1e-3))
     at, _ = draw_interval(random, begin, end, 1.0, 1.0)
     return [Step(at, lambda rig: rig.world.let_drift(address, rig.now, rate))]

@@ -12,7 +12,7 @@ TOGETHER = 3.0  # kinds switched on in a seed, on the average
 
 
 def drawn_kinds(seed: int, allowed: Sequence[str]) -> tuple[str, ...]:
-    """Names of the kinds that a seed switches on, at least one of those allowed."""
+    """Draw the names of the kinds that a seed switches on, at least one of those allowed."""
     share = min(TOGETHER / len(allowed), 1.0)
     switches = dict(
         zip((kind.name for kind in KINDS), stream(seed, Stream.GAUNTLET, 0).random(len(KINDS)), strict=True)

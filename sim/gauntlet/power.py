@@ -15,11 +15,11 @@ REFUSALS = (errno.ENOSPC, errno.EROFS)
 
 
 def keep_disk(rig: Faulty, address: int, random: np.random.Generator) -> None:
-    """The disk stays as the cut left it."""
+    """Leave the disk as the cut left it."""
 
 
 def power_cut(addresses: Iterable[int], before_start: Handle = keep_disk) -> Draw:
-    """A process loses its power for a while; something may happen to its disk meanwhile."""
+    """Draw of a power cut of a process for a while; ``before_start`` may change its disk meanwhile."""
     choice = tuple(addresses)
 
     def draw(random: np.random.Generator, begin: float, end: float) -> list[Step]:
@@ -37,7 +37,7 @@ def power_cut(addresses: Iterable[int], before_start: Handle = keep_disk) -> Dra
 
 
 def cut_all(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """Everything loses its power at once, and comes back one after the other."""
+    """Steps in which everything loses its power at once, and comes back one after the other."""
     off, on = draw_interval(random, begin, end, 2.0, 20.0)
     steps = [Step(off, lambda rig, a=address: rig.cut(a)) for address in EVERYBODY]  # type: ignore[misc]
     for address in EVERYBODY:
@@ -47,7 +47,7 @@ def cut_all(random: np.random.Generator, begin: float, end: float) -> list[Step]
 
 
 def cut_while_saving(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """The power of a process goes in the middle of what it writes next."""
+    """Steps in which the power of a process goes in the middle of its next write."""
     address = int(random.choice((BASE, *TUBES)))
     armed, on = draw_interval(random, begin, end, 5.0, 30.0)
     changes = int(random.integers(12))
@@ -60,7 +60,7 @@ def cut_while_saving(random: np.random.Generator, begin: float, end: float) -> l
 
 
 def cut_again_and_again(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """The power of a node comes and goes."""
+    """Steps in which the power of a node comes and goes."""
     address = int(random.choice((BASE, ENCODER, *TUBES)))
     steps = []
     for _ in range(4):
@@ -70,7 +70,7 @@ def cut_again_and_again(random: np.random.Generator, begin: float, end: float) -
 
 
 def encoder_from_zero(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """The encoder starts again and counts its time from zero."""
+    """Steps in which the encoder starts again and counts its time from zero."""
     off, on = draw_interval(random, begin, end, 1.0, 10.0)
 
     def start(rig: Faulty) -> None:
@@ -81,7 +81,7 @@ def encoder_from_zero(random: np.random.Generator, begin: float, end: float) -> 
 
 
 def delete_files(*patterns: str) -> Handle:
-    """Files are removed."""
+    """Handle that deletes files."""
 
     def act(rig: Faulty, address: int, _random: np.random.Generator) -> None:
         disk = rig.disk(address)
@@ -92,7 +92,7 @@ def delete_files(*patterns: str) -> Handle:
 
 
 def damage_files(pattern: str) -> Handle:
-    """The second half of files is other bytes."""
+    """Handle that overwrites the second half of files with 0xa5."""
 
     def act(rig: Faulty, address: int, _random: np.random.Generator) -> None:
         disk = rig.disk(address)
@@ -103,7 +103,7 @@ def damage_files(pattern: str) -> Handle:
 
 
 def rot_bytes(rig: Faulty, address: int, random: np.random.Generator) -> None:
-    """Single bytes of what a process keeps change."""
+    """Change single bytes of all that a process keeps."""
     disk = rig.disk(address)
     for name, data in disk.held("*").items():
         rotten = bytearray(data)
@@ -113,7 +113,7 @@ def rot_bytes(rig: Faulty, address: int, random: np.random.Generator) -> None:
 
 
 def restore_backup(rig: Faulty, address: int, random: np.random.Generator) -> None:
-    """The database of some commits ago is put in its place."""
+    """Replace the database by one of some commits ago."""
     disk = rig.disk(address)
     if disk.backups:
         backup = disk.backups[int(random.integers(len(disk.backups)))]
@@ -121,7 +121,7 @@ def restore_backup(rig: Faulty, address: int, random: np.random.Generator) -> No
 
 
 def refused_disk(*addresses: int) -> Draw:
-    """A disk is full, or takes nothing, for a while; the process may start again meanwhile."""
+    """Draw of a disk that is full or refuses writes for a while; the process may start again meanwhile."""
 
     def draw(random: np.random.Generator, begin: float, end: float) -> list[Step]:
         address, refusal = int(random.choice(addresses)), int(random.choice(REFUSALS))
@@ -139,7 +139,7 @@ def refused_disk(*addresses: int) -> Draw:
 
 
 def swap_folders(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """Two tubes get each other's saved state."""
+    """Steps in which two tubes get each other's saved state."""
     off, on = draw_interval(random, begin, end, 2.0, 10.0)
 
     def swap(rig: Faulty) -> None:
@@ -154,7 +154,7 @@ def swap_folders(random: np.random.Generator, begin: float, end: float) -> list[
 
 
 def same_number(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """For a while a tube's place is taken by another one with the number of its neighbour."""
+    """Steps in which a tube's place is taken for a while by another one with the number of its neighbour."""
     off, on = draw_interval(random, begin, end, 5.0, 20.0)
     tube, number = (1, 2) if random.random() < 0.5 else (2, 1)
 
@@ -170,19 +170,19 @@ def same_number(random: np.random.Generator, begin: float, end: float) -> list[S
 
 
 def freeze_process(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """A process stands still for up to 30 s, and then goes on."""
+    """Steps in which a process stands still for up to 30 s, and then goes on."""
     address = int(random.choice(EVERYBODY))
     still, on = draw_interval(random, begin, end, 1.0, 30.0)
     return [Step(still, lambda rig: rig.freeze(address)), Step(on, lambda rig: rig.thaw(address))]
 
 
 def ground_off_across_stop(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """The ground station is off from before a stop until after the survey."""
+    """Steps in which the ground station is off from before a stop until after the survey."""
     del begin
     drawn = float(random.uniform(22.0, 34.0))
     return [Step(end - drawn, lambda rig: rig.cut(BASE)), Step(end, lambda rig: rig.start(BASE))]
 
 
 def drawn_process(random: np.random.Generator) -> int:
-    """A tube, or the ground station."""
+    """Draw a tube or the ground station."""
     return BASE if random.random() < 0.3 else drawn_tube(random)

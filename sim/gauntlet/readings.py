@@ -15,7 +15,7 @@ COUNTS = 4096  # of a turn
 
 
 def spoil_sensor(spoil: Callable[[Reading], Reading]) -> Draw:
-    """Readings of a tube are spoiled for a while."""
+    """Draw of a fault that spoils the readings of a tube for a while."""
 
     def draw(random: np.random.Generator, begin: float, end: float) -> list[Step]:
         tube = drawn_tube(random)
@@ -30,37 +30,37 @@ def spoil_sensor(spoil: Callable[[Reading], Reading]) -> Draw:
 
 
 def gyro_stuck(reading: Reading) -> Reading:
-    """It repeats itself."""
+    """Return the reading with a gyroscope that repeats itself."""
     return [0.1, 0.1, 0.1, *reading[3:]]
 
 
 def gyro_saturated(reading: Reading) -> Reading:
-    """It is at its range."""
+    """Return the reading with a gyroscope at its range."""
     return [*reading[:2], 8.7266, *reading[3:]]
 
 
 def gyro_saturated_below(reading: Reading) -> Reading:
-    """It is at the other end of its range."""
+    """Return the reading with a gyroscope at the other end of its range."""
     return [*reading[:2], -8.7266, *reading[3:]]
 
 
 def gyro_step(reading: Reading) -> Reading:
-    """Its bias is another one, by 3 deg/s."""
+    """Return the reading with a gyroscope bias changed by 3 deg/s."""
     return [*reading[:2], reading[2] + 0.052, *reading[3:]]
 
 
 def gyro_scale(reading: Reading) -> Reading:
-    """It shows a tenth too much."""
+    """Return the reading with a gyroscope that reads 10 % too high."""
     return [*reading[:2], reading[2] * 1.1, *reading[3:]]
 
 
 def force_stuck(reading: Reading) -> Reading:
-    """It repeats itself."""
+    """Return the reading with an accelerometer that repeats itself."""
     return [*reading[:3], 1.0, 2.0, -9.0, *reading[6:]]
 
 
 def force_saturated(reading: Reading) -> Reading:
-    """It is at its range."""
+    """Return the reading with an accelerometer at its range."""
     return [*reading[:3], -78.5, *reading[4:]]
 
 
@@ -68,19 +68,19 @@ OF_FORCE = (force_stuck, force_saturated)  # that leave a tube its gyroscope
 
 
 def not_finite(reading: Reading) -> Reading:
-    """Its readings are no numbers."""
+    """Return the reading with non-finite values."""
     return [float("nan"), *reading[1:]]
 
 
 def encoder_slips(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """The encoder loses its grip, for the rest of the run."""
+    """Steps in which the encoder slips once, for the rest of the run."""
     at = float(random.uniform(begin, end))
     by = int(random.uniform(0.05, 0.45) * COUNTS) * (1 if random.random() < 0.5 else -1)
     return [Step(at, lambda rig: setattr(rig.world, "slipped", rig.world.slipped + by))]
 
 
 def encoder_dead(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """The encoder counts no more for a while."""
+    """Steps in which the encoder stops counting for a while."""
 
     def stop(rig: Faulty) -> None:
         rig.world.stuck_at = rig.now
@@ -89,7 +89,7 @@ def encoder_dead(random: np.random.Generator, begin: float, end: float) -> list[
 
 
 def depth_off(metres: float) -> Draw:
-    """The depth is wrong for a while."""
+    """Draw of a depth that is off by ``metres`` for a while."""
     return lasting_fault(
         2.0,
         60.0,
@@ -99,7 +99,7 @@ def depth_off(metres: float) -> Draw:
 
 
 def depth_lost(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """No depth is measured for a while, or never again."""
+    """Steps in which no depth is measured for a while, or never again."""
     at, until = draw_interval(random, begin, end, 3.0, 60.0)
     steps = [Step(at, lambda rig: setattr(rig.world, "depth_hidden", True))]
     if random.random() < 0.7:
@@ -108,7 +108,7 @@ def depth_lost(random: np.random.Generator, begin: float, end: float) -> list[St
 
 
 def depth_backwards(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-    """The depth runs backwards by 0.6 m/s, and is then right again."""
+    """Steps in which the depth runs backwards by 0.6 m/s, and is then right again."""
     at, until = draw_interval(random, begin, end, 3.0, 8.0)
     steps: list[Step] = []
     t, error = at, 0.0
@@ -119,6 +119,6 @@ def depth_backwards(random: np.random.Generator, begin: float, end: float) -> li
 
 
 def depth_ahead(rig: Faulty, random: np.random.Generator) -> None:
-    """A depth comes from the future."""
+    """Send a depth with a time in the future."""
     at = rig.world.local_clock(ENCODER, rig.now) + float(random.uniform(10.0, 1e4))
     rig.send_depth(encode(DepthReading(int(random.integers(1, 10**6)), at, float(random.uniform(0.0, 10.0)), ())))

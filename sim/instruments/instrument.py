@@ -18,7 +18,7 @@ class InstrumentError(SimError, ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Records:
-    """Files of one instrument by name, and what their calibration is to find, by name."""
+    """Files of one instrument by name, and the parameters that their calibration must find, by name."""
 
     files: Mapping[str, bytes]
     truth: Mapping[str, Any]

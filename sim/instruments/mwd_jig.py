@@ -42,7 +42,7 @@ UNITS = "Tilt and tool face in deg, temperature in C, accelerometers A B C and m
 
 
 class Heating(Enum):
-    """How the temperature runs while the jig goes through tilts (outer) and tool faces (inner)."""
+    """Course of the temperature while the jig goes through tilts (outer) and tool faces (inner)."""
 
     ROOM = "room"  # one temperature
     SOAK = "soak"  # every attitude at each of five temperatures
@@ -130,7 +130,7 @@ def make_design(heating: Heating, seed: int = 0, tilts: int = 7) -> JigDesign:
 
 
 def fresh_design(seed: int, hot: bool, count: int = 400) -> JigDesign:
-    """Attitudes uniform over the sphere that no calibration has seen."""
+    """Attitudes uniform over the sphere, for a check of a calibration that has not seen them."""
     random = stream(seed, JigStream.FRESH)
     tilt = np.arccos(random.uniform(-1.0, 1.0, count))
     face, azimuth = random.uniform(0.0, 2.0 * np.pi, (2, count))

@@ -213,7 +213,7 @@ class BusStepper:
             if event.kind <= Side.LOWER:
                 seat.put(Side(event.kind), bytes(frame))
             elif event.kind is Due.DEPTH:
-                self._depth.put(event.data)  # for whoever watches; the ground station has it in its step
+                self._depth.put(event.data)  # for watchers; the ground station has it in its step
         seat.step(event for event, _ in events)
 
     def _answer(self, seat: Seat) -> Answer | None:
@@ -247,7 +247,7 @@ class BusStepper:
         return True
 
     def _tell(self, arrival: Arrival) -> None:
-        """Take what nobody waits for, on a thread of the bus."""
+        """Take an arrival that is not waited for, on a thread of the bus."""
         self._events.put(arrival)
         if self._listener is not None:
             self._listener.wake()

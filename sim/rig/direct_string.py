@@ -15,11 +15,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from node.firmware.encoder import EncoderNode, EncoderSample
+from node.firmware.encoder_node import EncoderNode, EncoderSample
 from node.firmware.inputs import RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
-from node.kernels.arithmetic.angles import from_binary, wrap
+from node.kernels.arithmetic.angles import from_binary, wrap_angle
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Err, Scheme, default_config
 from node.kernels.record.integer_node import new_integers
@@ -37,7 +37,7 @@ from node.kernels.record.node_record import (
 )
 from node.kernels.record.sensor_record import PARAMETERS
 from node.kernels.sensors.correction import USUAL
-from node.kernels.step.address import BY_ADDRESS, firmware
+from node.kernels.step.address import BY_ADDRESS, firmware_addresses
 from node.kernels.step.node_step import ADMITTED
 from node.process.reading import reading_of
 from sim.errors import ScenarioError
@@ -100,7 +100,7 @@ class StringRun:
 class DirectString:
     """One string of one world.
 
-    ``clock_shifts`` moves the clock of a tube by so many seconds, a plain field to be changed by whoever tests.
+    ``clock_shifts`` moves the clock of a tube by so many seconds, a plain field to be changed by tests.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class DirectString:
         stated = clocks.joint_std_ms if clocks.stated_std_ms is None else clocks.stated_std_ms
         self._clock_var = (1e-3 * stated) ** 2 * np.arange(1, count + 1)  # s^2, by hops
         self._adds = [phase for phase in world.phases if phase.kind == "add"]
-        self._crews = np.concatenate([tube.crew for tube in self.tubes.values()])
+        self._crews = np.concatenate([tube.settings_record for tube in self.tubes.values()])
         self.clock_shifts: dict[int, float] = {}
         self._mount_var = math.radians(self._file.joints.mount_std_deg) ** 2
         self._runs_together = spoil is None and self._imus == 1 and self._file.node.kernel in BY_ADDRESS
@@ -168,7 +168,7 @@ class DirectString:
             yield cycle
 
     def _advance(self, first: int, last: int) -> int:
-        """Run the cycle ``first``, and those after it while nobody has anything to say; returns which is next."""
+        """Run the cycle ``first``, and those after it while no message is due; returns the next cycle."""
         if self._hands_on:
             return self._run_together(first, last)
         string = self._string_at(self.world.cycle_end(first))
@@ -287,7 +287,7 @@ class DirectString:
     def _run_together(self, first: int, last: int) -> int:
         """Take all nodes through cycles in one call, until one has something to say; returns which cycle is next."""
         course, desk = self._course, self._desk
-        step, aid = firmware(self._file.node.kernel)
+        step, aid = firmware_addresses(self._file.node.kernel)
         if course is None:
             raise ScenarioError("string: expected nodes that run together")
         shifts = np.array([self.clock_shifts.get(tube, 0.0) for tube in self.tubes])
@@ -410,7 +410,7 @@ class DirectString:
         run = self.run
         for first in reversed(run.surveys):
             if (first.tube, first.measurement.station_at) == (tube, message.station_at):
-                moved = wrap(message.yaw - first.measurement.yaw)
+                moved = wrap_angle(message.yaw - first.measurement.yaw)
                 run.revisions.append(Survey(first.cycle, tube, first.error + moved, message, cycle))
                 return
         run.surveys.append(Survey(cycle, tube, float(run.total_error[cycle, tube - 1]), message, cycle))

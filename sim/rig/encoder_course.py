@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from node.firmware.edge_interpolation import EDGES, stopped_at
-from node.firmware.encoder import STOP_STD
+from node.firmware.encoder_node import STOP_STD
 from node.firmware.torque import drive_record
 from node.kernels.arithmetic.jit import kernel
 from node.kernels.record.node_record import A_SEQUENCE, AIDING

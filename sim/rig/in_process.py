@@ -86,7 +86,7 @@ class InProcessStepper:
 
 
 def unwritten(frame: Content) -> Content:
-    """A frame as the link hands it over: one that nobody wants the bytes of need not become any."""
+    """Return a frame as the link hands it over: without need of its bytes none are made."""
     return frame
 
 

@@ -22,7 +22,7 @@ from telemetry.media.zenoh_bus import ZenohBus
 from telemetry.messages import address_name
 
 SUPERVISE_EVERY = 0.2  # wall s
-STALL_LIMIT = 300.0  # wall s without any progress of rig time, in which nobody is waited for
+STALL_LIMIT = 300.0  # wall s without progress of rig time and without a process that is waited for
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,7 +48,7 @@ class LinkChannel:
         delays = [first]
         if fate > 1.0 - self.duplicate:
             delays.append(first + self.latency + self._jitter * again)
-        if self.corrupt == 0.0:  # as nearly always
+        if self.corrupt == 0.0:  # the usual case
             return [(delay, frame) for delay in delays]
         return [(delay, drawn.damage(bytes(frame), self.corrupt)) for delay in delays]
 

@@ -69,7 +69,7 @@ def yaw_errors(measurements: Sequence[dict[str, Any]], world: World) -> list[tup
 
 
 def missing_surveys(measurements: Sequence[dict[str, Any]], world: World) -> list[dict[str, Any]]:
-    """Tube and depth of the bit of every survey that a stop of the schedule asks for and nobody has."""
+    """Tube and depth of the bit of every survey that a stop of the schedule asks for and that is missing."""
     taken = [(int(m["tube"]), float(m["station_at_s"])) for m in measurements]
     missing = []
     for stop, until in stops_of(world):

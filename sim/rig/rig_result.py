@@ -35,7 +35,7 @@ def rig_result(answers: dict[str, Any], world: World) -> dict[str, Any]:
 
 
 def missing_surveys_line(missing: list[dict[str, Any]], measured: int, folder: Path) -> str:
-    """Line about surveys that the stops of a run asked for and nobody has."""
+    """Line about surveys that the stops of a run asked for and that were not taken."""
     named = ", ".join(f"tube {row['tube']} at {row['bit_md_m']:g} m of the bit" for row in missing[:NAMED])
     more = f" and {len(missing) - NAMED} more" if len(missing) > NAMED else ""
     return f"expected {measured + len(missing)} surveys, {len(missing)} are missing: {named}{more}; files in {folder}"

@@ -45,7 +45,7 @@ Entry = tuple[float, int, int, int, "Due | None", Content, "float | None"]
 
 @dataclass(slots=True)
 class Progress:
-    """What the rig is doing, for whoever watches."""
+    """What the rig is doing, for display."""
 
     phase: str
     rig_time: float
@@ -78,7 +78,7 @@ class Scheduler:
     stepper : hands the steps to the processes
     tell : called with the progress whenever what is wanted changes, and once a cycle
     speed : rig seconds per wall second, infinite for as fast as possible
-    cued : somebody plays the operator and is waited for, so that what he does falls on the same rig time in every run
+    cued : an operator is played and waited for, so that the orders fall on the same rig time in every run
     seal_depth : what the source of the depth makes of a reading's payload
     absent : called with the name of a process that is waited for and for how long it has been (wall s); it may raise
     """
@@ -269,7 +269,7 @@ class Scheduler:
                 break
         else:
             name = address_name(address)
-            raise RigError(f"fault kill-node:{name}: nobody killed the process within {ATTACH_LIMIT:.0f} s")
+            raise RigError(f"fault kill-node:{name}: the process was not killed within {ATTACH_LIMIT:.0f} s")
         self.progress.kill = []
         self._wake.pop(address, None)
 

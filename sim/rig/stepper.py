@@ -1,4 +1,4 @@
-"""What the scheduler of a rig needs of whoever hands out its steps: processes on a bus, or objects in this process."""
+"""Interface through which a rig's scheduler hands out steps: to processes on a bus, or to objects in this process."""
 
 from __future__ import annotations
 

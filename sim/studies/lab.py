@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.fusion.resolve import direction_angles, resolve_direction
-from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.arithmetic.formats import PERIOD
 from sim.rig.direct_string import DirectString, StringRun, wrapped
 from sim.studies.scenarios import Tables, complete_string
@@ -50,7 +50,7 @@ ONCE_AIDED: Mask = ROTATING & (STOP - TURN.duration + FIRST_PERIOD <= ENDS)
 
 @dataclass(frozen=True, slots=True)
 class LabRun:
-    """What one seed left: yaw errors (cycles, hops) rad and the rest, hop by hop from the head down."""
+    """Results of one seed: yaw errors (cycles, hops) rad and the rest, hop by hop from the head down."""
 
     error: Array  # rad, at the end of every cycle
     var: Array  # rad^2, as the node states it
@@ -113,4 +113,4 @@ def _azimuth_of_survey(survey: SurveyMeasurement | None) -> float:
 def _azimuth(force: Array, cov: Array, yaw: float, yaw_var: float) -> float:
     """Azimuth of the tube in (-pi, pi]; the hole leans north, so it is the error."""
     direction = resolve_direction(force, cov, yaw, yaw_var).direction
-    return wrap(direction_angles(direction.lean, direction.down)[1])
+    return wrap_angle(direction_angles(direction.lean, direction.down)[1])

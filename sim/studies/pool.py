@@ -54,7 +54,7 @@ def over_cores(most: int, step: Step) -> Iterator[RunAll]:
 
 @contextmanager
 def one_pool() -> Iterator[None]:
-    """Have all of ``over_cores`` inside run on the same processes, which are started when first asked for."""
+    """Run all ``over_cores`` inside on the same processes, which are started on first use."""
     token = KEPT.set([])
     try:
         yield
@@ -67,7 +67,7 @@ def one_pool() -> Iterator[None]:
 
 @contextmanager
 def _pool_of(processes: int) -> Iterator[Pool]:
-    """Processes of its own, or those that are kept, of which there is one a core."""
+    """Yield a pool of its own, or the shared one, which has a process a core."""
     kept = KEPT.get()
     if kept is None:
         with _started(processes) as pool:
@@ -89,7 +89,7 @@ def usable_cores() -> int:
     Raises
     ------
     RigError
-        When that is no number of processes.
+        When the variable is not a positive integer.
     """
     given = os.environ.get(CORES, "")
     if not given:

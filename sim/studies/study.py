@@ -25,7 +25,7 @@ ARRAYS = "traces"  # of a result: arrays that only figures need
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """Something a study takes: a whole number of ``least``..``most``, or one of ``choices``."""
+    """Option of a study: a whole number of ``least``..``most``, or one of ``choices``."""
 
     name: str
     default: int | str | None
@@ -72,17 +72,17 @@ class Study:
     short: str = ""
 
     def run(self, given: Mapping[str, Any], step: Callable[[], None]) -> Result:
-        """Run it with what was ``given``."""
+        """Run the study with the options ``given``."""
         result: Result = self._of("run", "run_study")(**self.fixed, **given, step=step)
         return result
 
     def steps(self, given: Mapping[str, Any]) -> int:
-        """How often ``step`` will be called."""
+        """Number of calls of ``step``."""
         count: int = self._of("run", "count_steps")(**self.fixed, **given)
         return count
 
     def told(self, result: Result) -> Result:
-        """What of a result is for JSON."""
+        """Return the part of a result that goes into JSON."""
         return {key: value for key, value in result.items() if key != ARRAYS}
 
     def verdicts(self, result: Result) -> list[str]:

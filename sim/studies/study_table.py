@@ -64,7 +64,10 @@ STUDIES = by_name(
             "How often the claimed ellipse holds the true position, over wells drilled with the rig's own numbers.",
             f"{MODULES}.coverage",
             (ResultTable("Coverage over {wells} wells", table_columns.COVERAGE, table_columns.COVERAGE),),
-            (Option("wells", 2000, 100, 1_000_000), Option("strings", 100, 2, 10_000, help="Whose filters are run.")),
+            (
+                Option("wells", 2000, 100, 1_000_000),
+                Option("strings", 100, 2, 10_000, help="Strings whose filter is run."),
+            ),
             counts="strings, then wells",
             full=("--wells 2000",),
             short="--wells 100 --strings 2",

@@ -18,13 +18,14 @@ Array = npt.NDArray[np.float64]
 RESAMPLES = 2000
 SHOWN_SEED = 0  # index of the seed that figures show by itself
 Trials = Callable[[Tables], list[LabRun]]
+RunOne = Callable[[tuple[Tables, int]], LabRun]
 
 
 @contextmanager
-def over_seeds(seeds: int, step: Step) -> Iterator[Trials]:
-    """Yield the function that runs the seeds 1..``seeds`` of a setup on all cores, in their order."""
+def over_seeds(seeds: int, step: Step, run_one: RunOne = run_seed) -> Iterator[Trials]:
+    """Yield the function that runs the seeds 1..``seeds`` of a setup on all cores, in order, each by ``run_one``."""
     with over_cores(seeds, step) as run_all:
-        yield lambda setup: run_all(run_seed, seed_jobs(setup, seeds))
+        yield lambda setup: run_all(run_one, seed_jobs(setup, seeds))
 
 
 def rms_deg(errors: Sequence[Array]) -> tuple[float, float, float]:

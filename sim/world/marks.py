@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from node.firmware.settings import Joint, PassedTube
+from node.firmware.tube_settings import MakeUpAngle, PassedTube
 from sim.world.motion import Motion
 from sim.world.scenario import Scenario
 from sim.world.streams import Stream, stream
@@ -44,8 +44,8 @@ class Marks:
         drive_error, lower_error = self._joint_errors
         misread = self._misread(tube)
         return PassedTube(
-            Joint(wrap(drive[tube] - self._turned_before(tube) + drive_error[tube] + misread), std),
-            Joint(wrap(lower[tube] + lower_error[tube]), std),
+            MakeUpAngle(wrap(drive[tube] - self._turned_before(tube) + drive_error[tube] + misread), std),
+            MakeUpAngle(wrap(lower[tube] + lower_error[tube]), std),
         )
 
     def errors(self, tube: int) -> Array:

@@ -55,7 +55,7 @@ class RadioLinks:
         self._fades = [section.fade_std_db * stream(seed, Stream.RADIO_FADE, k).standard_normal() for k in joints]
         self._bursts = [Bursts(section, stream(seed, Stream.RADIO_BURSTS, k), begin, end) for k in joints]
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PorosityWarning)  # whoever loaded the scenario was warned
+            warnings.simplefilter("ignore", PorosityWarning)  # the user was warned when the scenario was loaded
             self._of_layers = layer_margins(section)
         self._bounds = [layer.to_m or math.inf for layer in section.soil]
         self._of_hops = hop_margins(section, tube_length)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from node.firmware.settings import MAX_REACH
+from node.firmware.tube_settings import MAX_REACH
 from sim.world.section import NotNegative, Positive, Section
 from telemetry.radio.path_loss import THRESHOLD, TRANSMITTED, WIDTH
 

@@ -16,8 +16,8 @@ import numpy.typing as npt
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import PARTS
 from node.kernels.sensors.correction import USUAL
+from node.process.drivers.fifo_window import parts_of
 from node.process.drivers.frame_clock import FrameClock
-from node.process.drivers.parts import parts_of
 from sim.world.imu_errors import ImuErrors
 from sim.world.increments import eighths
 from sim.world.rough_section import RoughSection, RoughSensorSection, RoughVibrationSection
@@ -35,7 +35,8 @@ FRAME_STEPS = 32768.0  # of a range
 class Cycles:
     """Readings of one IMU: (cycles, 6) rad/s and m/s^2, (cycles,) C, bits, s that their windows were late by, its std.
 
-    ``parts`` (cycles, 9) rad/s are as a driver tells them, see ``node.process.drivers.parts``; NaN or None if not told.
+    ``parts`` (cycles, 9) rad/s are as a driver tells them, see ``node.process.drivers.fifo_window``; NaN or None if not
+    told.
     """
 
     readings: Array

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
+from pydantic_core import PydanticCustomError
 
+from node.firmware.kernel_choice import LOOPS
 from node.kernels.record.sensor_record import MAX_IMUS
 from sim.world.radio_section import RadioSection
 from sim.world.rough_section import RoughSection
@@ -211,15 +213,29 @@ class AidingSection(Section):
     renumbered: bool = Field(False, description="at rest every cycle's aiding counts as a new measurement")
 
 
+def known_kernel(name: str) -> str:
+    """Name of a kernel that a node can run now.
+
+    Raises
+    ------
+    PydanticCustomError
+        When there is none of that name.
+    """
+    if name not in LOOPS:
+        raise PydanticCustomError("kernel", "expected one of {known}", {"known": ", ".join(LOOPS)})
+    return name
+
+
+KernelName = Annotated[str, AfterValidator(known_kernel)]
+
+
 class NodeSection(Section):
     """Firmware settings of every node."""
 
     scheme: Literal["forward", "estimate", "intersection"] = Field(
         "forward", description="what is relayed: the encoder's measurement, or estimates (the two negative controls)"
     )
-    kernel: Literal["float64", "fixed", "published"] = Field(
-        "float64", description="the loop in floats, in integers, or in the published feed-forward form"
-    )
+    kernel: KernelName = Field("float64", description="the loop in floats or in integers")
     torsion: Literal["gate", "variance", "ignore"] = Field(
         "gate", description="aiding under torque: not used, or with a variance; ignore: the rig knows no torque"
     )

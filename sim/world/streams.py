@@ -1,4 +1,4 @@
-"""Streams of random numbers: whoever draws has one of its own, so that nothing else changes what it gets.
+"""Streams of random numbers: each consumer has one of its own, so that nothing else changes its draws.
 
 ``Stream`` is the one table of purposes. A stream is named by the seed, its purpose and what parts it further (a tube,
 an IMU, a port), so that no draw depends on the order of others. A number once given is never used for another purpose.

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from node.firmware.imu_settings import ImuSettings
-from node.firmware.settings import TubeSettings
 from node.firmware.torque import TorqueSettings
+from node.firmware.tube_settings import TubeSettings
 from node.kernels.record.filter_record import Scheme
 from sim.errors import ScenarioError
 from sim.node_kills import KillNode

@@ -37,7 +37,7 @@ CHECKS: dict[ValueKind, Callable[[Quantity, Any], Any]] = {
 
 
 def check_arguments(spec: CommandSpec, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Arguments in SI, defaults in place of what is left out.
+    """Return the arguments in SI, with defaults for those left out.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def check_arguments(spec: CommandSpec, arguments: Mapping[str, Any]) -> dict[str
 
 
 def parse_parameters(spec: CommandSpec, parameters: Mapping[str, str]) -> dict[str, Any]:
-    """Arguments in SI of an operator's text; what is left out stays out.
+    """Return the arguments in SI from an operator's text; those left out stay out.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def parse_tube(spec: CommandSpec, parameters: Mapping[str, str]) -> int:
 
 
 def checked_values(spec: CommandSpec, values: Mapping[str, Value]) -> dict[str, Value]:
-    """Values of a reply that the table promises; what does not fit it is left out, a node may be of another version."""
+    """Values of a reply that the table lists; others are left out, since a node may be of another version."""
     checked: dict[str, Value] = {}
     for quantity in spec.reply:
         if quantity.name in values:
@@ -93,7 +93,7 @@ def checked_values(spec: CommandSpec, values: Mapping[str, Value]) -> dict[str, 
 
 
 def shown_values(quantities: Iterable[Quantity], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values as an operator reads them: degrees for radians, the unit in the name."""
+    """Return values as an operator reads them: degrees for radians, the unit in the name."""
     return {shown_name(q): _shown(q, values[q.name]) for q in quantities if q.name in values}
 
 

@@ -37,14 +37,14 @@ STATE = NodeState(
 
 @dataclass(frozen=True, slots=True)
 class RepeatedMessage:
-    """A message that comes again and again."""
+    """A periodic message."""
 
     message: Message
     rate: float  # 1/s
 
 
 def steady_traffic(tubes: int, cycle: float = CYCLE) -> list[RepeatedMessage]:
-    """What crosses the joint above ``tubes`` tubes while the string turns."""
+    """Periodic messages over the joint above ``tubes`` tubes while the string turns; ``cycle`` in s."""
     return [
         RepeatedMessage(AIDING, 1.0 / cycle),
         RepeatedMessage(STATE, tubes / cycle),
@@ -55,7 +55,7 @@ def steady_traffic(tubes: int, cycle: float = CYCLE) -> list[RepeatedMessage]:
 
 
 def link_bytes(message: Message, *, sealed: bool) -> int:
-    """Bytes of a frame of the link that carries a message and nothing else."""
+    """Size (bytes) of a frame of the link that carries only this message."""
     if not sealed:
         return len(pack_frame(HEADER, [(0, encode(message))]))
     if isinstance(message, Aiding):
@@ -78,7 +78,7 @@ def message_bus_time(message: Message, profile: str, rates: BitRates, *, fd: boo
 
 
 def header_load(profile: str, rates: BitRates, *, fd: bool, sealed: bool = False) -> float:
-    """Share of its time that the bus is busy with the headers that both ends of the native profile say again."""
+    """Share of time in which the bus carries the headers that both ends of the native profile repeat."""
     if sealed or profile == "tunnel":
         return 0.0
     header = frame_lengths(len(pack_frame(HEADER, [])), FD_LARGEST if fd else CLASSIC_LARGEST)
@@ -86,14 +86,14 @@ def header_load(profile: str, rates: BitRates, *, fd: bool, sealed: bool = False
 
 
 def bus_load(traffic: list[RepeatedMessage], profile: str, rates: BitRates, *, fd: bool, sealed: bool = False) -> float:
-    """Share of its time that the bus is busy, signs of life included; over 1: it cannot carry that."""
+    """Share of time in which the bus is busy, signs of life included; over 1: more than it can carry."""
     messages = sum(t.rate * message_bus_time(t.message, profile, rates, fd=fd, sealed=sealed) for t in traffic)
     signs = presence_rate(traffic, profile) * rates.duration(PRESENCE_BYTES, fd=fd)
     return messages + header_load(profile, rates, fd=fd, sealed=sealed) + signs
 
 
 def presence_rate(traffic: list[RepeatedMessage], profile: str) -> float:
-    """Signs of life each second of the upper end, which sends little itself; the states below tell of the lower one."""
+    """Signs of life a second (1/s) of the upper end, which sends little; the states below stand for the lower one's."""
     states = sum(t.rate for t in traffic if isinstance(t.message, NodeState))
     own = sum(t.rate for t in traffic if isinstance(t.message, Aiding)) + 1.0 / HELLO_PERIOD
     return max(1.0 / PRESENCE_EVERY - own - (states if profile == "tunnel" else 0.0), 0.0)

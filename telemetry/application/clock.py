@@ -9,8 +9,8 @@ An exchange asked at t1, received t2, replied t3, back t4 measures ((t2 - t1) + 
 difference of its two delays. That half is at most half of what the round trip took beyond the shortest one. Where even
 the shortest was long (a machine that does many things has just started fifty nodes), it may have waited one way only:
 until three of late have taken as long and found the same, all of it beyond a plausible round trip counts as a wait.
-A reply that took seconds is no measurement: whoever asked has asked again since, or it was recorded and comes again
-after a start, when nothing better is known.
+A reply that took seconds is not used as a measurement: the question has been repeated since, or the reply is a
+recording that comes again after a start, when nothing better is known.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class ClockFilter:
 
     @property
     def synchronised(self) -> bool:
-        """Whether rig time is known at all."""
+        """Whether rig time is known."""
         return self.is_root or self.exchanges > 0
 
     @property
@@ -91,7 +91,7 @@ class ClockFilter:
 
     @property
     def drift_std(self) -> float:
-        """By how much the rate of rig time may be off, s/s.
+        """Standard deviation of the rate of rig time, s/s.
 
         Of the joints above only the variance of their time is known, and their rates are taken to be as well known.
         """
@@ -99,30 +99,30 @@ class ClockFilter:
         return math.sqrt(drift_var * (1.0 + self._told.clock_var / own)) if own > 0.0 else 0.0
 
     def take_step(self) -> float:
-        """By how much (s) the clock dates later than when this was asked last, because it was put right since.
+        """Return the correction (s) of the clock since the last call, positive where it now dates later.
 
-        NaN where nobody knows, for the own clock may have jumped or rig time is another one.
+        NaN where the step is unknown, for the own clock may have jumped or rig time is another one.
         """
         stepped, self.stepped = self.stepped, 0.0
         return stepped
 
     def change_neighbour(self) -> None:
-        """Compare anew from the next exchange on, with another crystal; what is known of rig time stays till then."""
+        """Restart the comparison at the next exchange, with another crystal; rig time stays as known till then."""
         self._another = True
 
     def suspect_neighbour(self) -> None:
-        """Believe the next exchange if it disagrees: the neighbour has started again, perhaps from zero."""
+        """Accept the next exchange even if it disagrees: the neighbour has restarted, perhaps from zero."""
         self._disagreed = RESET_AFTER - 1
 
     def doubt(self, seconds: float) -> None:
-        """The own clock may have jumped by so much (s): the next exchange is believed, and until then little."""
+        """Note a possible jump of the own clock by ``seconds``: take the next exchange, and trust little till then."""
         p00, p01, p11 = self._p
         self._p = (p00 + seconds * seconds, p01, p11)
         self._disagreed = RESET_AFTER - 1
         self._jumped = True
 
     def exchange(self, reply: TimeReply, back: float) -> None:
-        """Take the reply that came ``back`` at the local time (s) given, unless it cannot be or took too long."""
+        """Take a reply that came ``back`` at a local time (s); one that is impossible or took too long is ignored."""
         round_trip = (back - reply.asked_at) - (reply.replied_at - reply.received_at)
         if self.is_root or not 0.0 <= round_trip <= LONGEST_ROUND_TRIP:
             return
@@ -143,7 +143,7 @@ class ClockFilter:
         self.stepped += (before - self.rig_from_local(back)) / self.rig_rate if continues else math.nan
 
     def _doubt(self) -> float:
-        """How far (s) the shortest round trip itself may be off, for it may have waited one way only."""
+        """Possible error (s) of the shortest round trip, which may have waited one way only."""
         beyond = 0.5 * max(self._least_round_trip - PLAUSIBLE_ROUND_TRIP, 0.0)
         if beyond == 0.0 or len(self._of_late) < AGREEING:
             return beyond

@@ -25,7 +25,7 @@ STAGES = ("synchronise", "start", "aiding", "frame", "read", "filter", "report",
 
 
 class ObeyedBy(enum.Enum):
-    """Who obeys a command."""
+    """Process that obeys a command."""
 
     TUBE = "tube"
     GROUND = "ground station"
@@ -33,7 +33,7 @@ class ObeyedBy(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """An argument: what it may be, whether it is needed, and what stands for it where it is left out."""
+    """An argument: its range, whether it is required, and its default."""
 
     quantity: Quantity
     needed: bool = False
@@ -106,7 +106,7 @@ COMMANDS: tuple[CommandSpec, ...] = (
     CommandSpec(
         "parameters",
         ObeyedBy.TUBE,
-        "names the parameter block in use",
+        "reports the parameter block in use",
         reply=(_result("version", INTEGER, "of the block in use, 0 is the identity", "1"), SHA256),
     ),
     CommandSpec(
@@ -127,12 +127,12 @@ COMMANDS: tuple[CommandSpec, ...] = (
         ObeyedBy.TUBE,
         "finds the mount of its IMUs in the coming slow turns, or drops it ([operating](operate.md#alignment))",
         (METHOD, TURNS),
-        (_result("method", TEXT, "that is used"), _result("turns", NUMBER, "that are waited for", "1")),
+        (_result("method", TEXT, "in use"), _result("turns", NUMBER, "slow turns to come", "1")),
     ),
     CommandSpec(
         "alignment",
         ObeyedBy.TUBE,
-        "names the alignment in use",
+        "reports the alignment in use",
         reply=(
             _result("method", TEXT, "circle, extremes or none"),
             _result("pitch", ValueKind.NUMBERS, ONE_AN_IMU, "rad"),
@@ -144,7 +144,7 @@ COMMANDS: tuple[CommandSpec, ...] = (
     CommandSpec(
         "timing",
         ObeyedBy.TUBE,
-        f"says how late its cycles start and how long their stages take, with a clock of its own: {', '.join(STAGES)}",
+        f"reports its cycles' start delays and the durations of their stages, with an own clock: {', '.join(STAGES)}",
         reply=(
             _result("cycles", INTEGER, "since the start", "1"),
             _result("overruns", INTEGER, "cycles that ended too late", "1"),
@@ -169,26 +169,26 @@ COMMANDS: tuple[CommandSpec, ...] = (
     CommandSpec(
         "accept_depth",
         ObeyedBy.GROUND,
-        "believes the depth that comes now, after it jumped and the crew has measured it again",
+        "accepts the present depth, after it jumped and the crew has measured it again",
         action="confirm",
     ),
     CommandSpec(
         "accept_joints",
         ObeyedBy.GROUND,
-        "takes the angles of the joints as they are for right, after a joint was made up anew or its yaws were checked",
+        "accepts the present angles of the joints, after a joint was made up anew or its yaws were checked",
         action="confirm",
     ),
     CommandSpec(
         "alarm",
         ObeyedBy.GROUND,
-        "says that whoever orders it knows of the alarm; whoever does so later is told who was first",
+        "confirms that the sender knows of the alarm; a later sender is told who was first",
         (ALARM_NUMBER,),
         action="acknowledge",
     ),
     CommandSpec(
         "alarm",
         ObeyedBy.GROUND,
-        "puts the alarm away for a time",
+        "shelves the alarm for a time",
         (
             ALARM_NUMBER,
             _argument("minutes", NUMBER, "until it is back", unit="min", low=1.0, high=SHELVED_AT_MOST, default=30.0),
@@ -244,7 +244,7 @@ NAMES = tuple(dict.fromkeys(spec.name for spec in COMMANDS))
 
 
 def find_command(name: str, action: str = "") -> CommandSpec:
-    """Line of the table.
+    """Return the table's line of a command.
 
     Raises
     ------

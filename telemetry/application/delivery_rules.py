@@ -37,5 +37,5 @@ PRIORITIES: dict[Kind, Priority] = {
 
 
 def is_warning(message: Kept) -> bool:
-    """Whether the crew may have to act at once."""
+    """Return whether the crew may have to act at once."""
     return isinstance(message, Event) and message.severity is not Severity.INFO

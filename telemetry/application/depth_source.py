@@ -1,6 +1,6 @@
 """What sends the depth of the bit: numbers the readings and repeats the last stands in each.
 
-Nobody asks for a reading that was lost, so each carries what the ground station needs of those before: where the bit
+A reading that was lost is not repeated, so each carries what the ground station needs of those before: where the bit
 stood, and from when to when.
 """
 

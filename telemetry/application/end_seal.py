@@ -2,7 +2,7 @@
 
 A sealed payload begins with a byte that no payload of ours begins with; a relay hands it on as it is. It names two
 random session numbers, the tube's and the base's, and its tag covers both. Neither side believes what does not name
-the present pair, so nothing of before a restart of either is believed, and neither has to keep a counter.
+the present pair, so nothing from before a restart of either is believed, and neither has to keep a counter.
 
 The pair comes about so: a tube begins with a number of its own and 0 for the base's. The base answers what names no
 pair it knows with an offer, sealed for the tube's number, of a number drawn for this purpose. The tube takes an offer
@@ -46,7 +46,7 @@ class Pair(NamedTuple):
 
 
 class SealFinding(Enum):
-    """What the base makes of a sealed payload."""
+    """Finding of the base on a sealed payload."""
 
     NOTHING = 0  # it is of no effect
     BELIEVED = 1
@@ -54,12 +54,12 @@ class SealFinding(Enum):
 
     @property
     def is_believed(self) -> bool:
-        """Whether it is of effect."""
+        """Whether the payload takes effect."""
         return self is not SealFinding.NOTHING
 
     @property
     def begins_session(self) -> bool:
-        """Whether the tube has taken an offer just now."""
+        """Whether the tube has just taken an offer."""
         return self is SealFinding.BEGINS
 
 
@@ -78,7 +78,7 @@ class Sealed(NamedTuple):
 
 
 def content_of_sealed(payload: bytes) -> bytes:
-    """What a payload says, sealed or not; its seal is not looked at."""
+    """Return the content of a payload, sealed or not, without a look at its seal."""
     return payload[OVERHEAD:] if is_sealed(payload) else payload
 
 
@@ -90,13 +90,13 @@ def is_sealed(payload: bytes) -> bool:
 def close_payload(
     key: SealKey, way: bytes, content: bytes, pair: Pair, generation: int, newest: int, tube: int
 ) -> bytes:
-    """Sealed payload."""
+    """Seal a payload."""
     head = HEAD.pack(MARK, generation, newest, *pair)
     return head + key.tag(way, bytes([tube]), head, content) + content
 
 
 def open_sealed(ring: KeyRing, purpose: str, way: bytes, payload: bytes, tube: int) -> Sealed | None:
-    """Sealed payload with its tag judged; None where it does not fit."""
+    """Return a sealed payload whose tag fits; None where it does not."""
     if not is_sealed(payload):
         return None
     _, generation, newest, of_tube, of_base = HEAD.unpack_from(payload)
@@ -124,21 +124,21 @@ class SealingEnd:
         self._ring = ring
         self._lot = lot
         self._pair = Pair(lot(), 0)
-        self._before: Pair | None = None  # the pair of before the newest offer
+        self._before: Pair | None = None  # the pair in use before the newest offer
         self._began_at = -math.inf
         self._bases_newest: int | None = None
 
     def close(self, content: bytes) -> bytes:
-        """Sealed payload for the base."""
+        """Seal a payload for the base."""
         ring = self._ring()
         generation = ring.oldest if self._bases_newest is None else ring.common(self._bases_newest)
         key = ring.seal_key(generation, "end", self._address)
         if key is None:
-            return content  # revoked: nobody would believe it
+            return content  # revoked: no receiver would believe it
         return close_payload(key, UP, content, self._pair, generation, ring.newest, self._address)
 
     def open(self, payload: bytes, now: float, *, is_offer: bool) -> bool:
-        """Whether a payload from the base that came at ``now`` (s) is to be believed; an offer begins a session."""
+        """Return whether a payload from the base that came at ``now`` (s) is believed; an offer begins a session."""
         sealed = open_sealed(self._ring(), "end", DOWN, payload, self._address)
         if sealed is None:
             self.counters["seal_end_wrong_tag" if is_sealed(payload) else "seal_end_unsealed"] += 1
@@ -160,7 +160,7 @@ class SealingEnd:
 
 @dataclass(slots=True)
 class Offer:
-    """An offer under way to a tube, and how often the tube spoke without having it."""
+    """An offer on its way to a tube, and how often the tube spoke without it."""
 
     pair: Pair
     newest: int  # generation of the tube's keys
@@ -171,7 +171,7 @@ class Offer:
 
 @dataclass(slots=True)
 class EndSession:
-    """What the base knows of a tube's end."""
+    """Session of the base with a tube."""
 
     pair: Pair
     newest: int  # generation of the tube's keys
@@ -196,12 +196,12 @@ class BaseEnd:
         self._due: list[tuple[int, Offer]] = []
 
     def close(self, content: bytes, tube: int) -> bytes | None:
-        """Sealed payload for a tube; None where there is no session with it."""
+        """Seal a payload for a tube; None without a session."""
         session = self._sessions.get(tube)
         return None if session is None else self._closed(content, tube, session.pair, session.newest)
 
     def open(self, payload: bytes, tube: int, now: float) -> SealFinding:
-        """What a payload of a tube is worth that came at ``now`` (s)."""
+        """Judge a payload of a tube that came at ``now`` (s)."""
         sealed = open_sealed(self._ring(), "end", UP, payload, tube)
         if sealed is None:
             self.counters["seal_end_wrong_tag" if is_sealed(payload) else "seal_end_unsealed"] += 1
@@ -218,18 +218,18 @@ class BaseEnd:
         return SealFinding.NOTHING
 
     def newest_of(self, tube: int) -> int | None:
-        """Newest generation of keys that a tube has; None where there is no session with it."""
+        """Newest generation of keys that a tube has; None without a session."""
         session = self._sessions.get(tube)
         return None if session is None else session.newest
 
     def due_offers(self, content_for: Callable[[int], bytes]) -> list[tuple[int, bytes]]:
-        """Sealed offers that are due, each with its tube; ``content_for`` is what one to a tube says."""
+        """Take the sealed offers that are due, each with its tube; ``content_for(tube)`` gives their content."""
         due, self._due = self._due, []
         closed = [(tube, self._closed(content_for(tube), tube, offer.pair, offer.newest)) for tube, offer in due]
         return [(tube, payload) for tube, payload in closed if payload is not None]
 
     def is_next_state(self, tube: int, cycles: int) -> bool:
-        """Whether a state of so many cycles is newer than all of the session with its tube."""
+        """Return whether a state of ``cycles`` is newer than all earlier ones of the session with its tube."""
         session = self._sessions.get(tube)
         if session is None or cycles <= session.cycles:
             self.counters["seal_end_repeated"] += 1
@@ -238,7 +238,7 @@ class BaseEnd:
         return True
 
     def count_unproven(self, now: float) -> None:
-        """Count what was sealed for sessions that nobody has proven by ``now`` (s)."""
+        """Count what was sealed for sessions that are not proven by ``now`` (s)."""
         for tube, offers in list(self._offers.items()):
             for offer in [offer for offer in offers if now > offer.begun_at + PROOF_WITHIN]:
                 self._drop_offer(tube, offer)
@@ -253,7 +253,7 @@ class BaseEnd:
         return any(pair.base == o.pair.base and pair.tube != o.pair.tube for o in self._offers.get(tube, []))
 
     def _offer(self, tube: int, sealed: Sealed, now: float) -> None:
-        """A tube names no pair that is known: offer one, the same again while it names the same number."""
+        """Offer a session to a tube that names no known pair, the same one while the tube names the same number."""
         offers = self._offers.setdefault(tube, [])
         offer = next((o for o in offers if o.pair.tube == sealed.pair.tube), None)
         if offer is not None:

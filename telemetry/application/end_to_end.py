@@ -36,7 +36,7 @@ from telemetry.unwritten import Content
 if TYPE_CHECKING:
     from telemetry.application.seals import Seals
 
-KEPT_WAIT = 1.15  # s for which what is no warning waits for a state to go up with
+KEPT_WAIT = 1.15  # s that a message other than a warning waits for a state to go up with
 
 
 class EndToEndDelivery:
@@ -80,7 +80,7 @@ class EndToEndDelivery:
     def submit(self, message: Kept, now: float) -> None:
         """Keep a message until the ground station has receipted it, and send it unless messages are held back.
 
-        What is no warning goes up with the next states, in their frames.
+        Messages other than warnings go up with the next states, in their frames.
         """
         payload, needed = encode(message), is_needed(message)
         if is_warning(message) or not self.has_states:
@@ -94,33 +94,33 @@ class EndToEndDelivery:
         self._outbox.keep_payload(sequence, payload, now)
 
     def hold(self) -> None:
-        """Send no message that is kept before ``release``: what must be on the disk first is not yet."""
+        """Hold all kept messages back until ``release``, because the disk must be written first."""
         self._holding = True
 
     def release(self, now: float) -> None:
-        """Send what was held back."""
+        """Send the messages that were held back."""
         if self._holding:
             self._holding = False
             self._send_kept(now)
 
     def go_with_states(self, now: float) -> None:
-        """A state goes up: what waited for one goes with it."""
+        """Send the messages that waited for a state to go with."""
         self.has_states = True
         if self._outbox.release(now):
             self._send_kept(now)
 
     def reply(self, reply: Reply) -> None:
-        """Answer a command; the answer is kept, so that a repeated command is answered and not obeyed again."""
+        """Answer a command and keep the answer: a repeated command is answered, not obeyed again."""
         payload = encode(reply)
         self._answers.keep(reply.sequence, payload)
         self._send_up(payload)
 
     def send_status(self, status: BlockStatus) -> None:
-        """Tell the ground station how an upload stands."""
+        """Tell the ground station the state of an upload."""
         self._send_up(encode(status))
 
     def open_from_base(self, opened: Opened, payload: Content, now: float) -> Message | None:
-        """Message of the base for the process; None where it is not to be believed, or was for the mail alone."""
+        """Return the base's message for the process; None for one not believed, or handled here."""
         message = self._told(opened, payload, now)
         if isinstance(message, Receipt):
             self._settle(message)
@@ -138,15 +138,15 @@ class EndToEndDelivery:
         self._send_orders(now)
 
     def withdraw(self, sequence: int) -> None:
-        """Send an order no more."""
+        """Stop sending an order."""
         self._orders.settle(sequence)
 
     def send_segment(self, segment: BlockSegment) -> None:
-        """Send a part of a parameter block down; what is lost with a relay the upload repeats."""
+        """Send a part of a parameter block down; the upload repeats what is lost with a relay."""
         self._send_down(encode(segment), segment.tube, Priority.BLOCK)
 
     def acknowledge(self, message: Kept) -> None:
-        """Tell a tube that its message is stored, this one and no other of its number."""
+        """Send a receipt of this message, by its content, to its tube."""
         receipt = Receipt(message.tube, message.sequence, content_of_message(message))
         self._send_down(encode(receipt), receipt.tube, Priority.COMMAND)
 
@@ -157,12 +157,12 @@ class EndToEndDelivery:
                 self._lower.send_best_effort(payload, (Kind.SESSION_OFFER, tube), Priority.COMMAND)
 
     def open_from_tube(self, opened: Opened, payload: Content, now: float) -> Message | None:
-        """Message of a tube for the base; None where it is not to be believed, or answers nothing that was asked."""
+        """Return a tube's message for the base; None for one not believed, or an answer to no order."""
         message = self._heard(opened, payload, now)
         if isinstance(message, Reply):
             order = self._orders.payload(message.sequence)
             if order is None or open_payload(order).target != message.tube:
-                return None  # answered already, or by somebody who was not asked
+                return None  # answered already, or by a tube that was not asked
             self._orders.settle(message.sequence)
         return message
 
@@ -180,22 +180,22 @@ class EndToEndDelivery:
 
     @property
     def dropped(self) -> int:
-        """What found no place in the outbox since the start."""
+        """Number of messages without room in the outbox since the start."""
         return self._outbox.dropped
 
     def export_state(self, hops: int) -> bytes:
-        """What must survive a restart: numbers, unreceipted messages, answered commands, and the hops from the top."""
+        """Pack what a restart needs: numbers, unreceipted messages, answered commands, hops from the top."""
         return pack_state(self.series.following, self._outbox.contents(), self._answers.contents(), hops)
 
     def restore(self, saved: SavedState) -> None:
-        """Go on with what was saved."""
+        """Continue from a saved state."""
         self.series.following = saved.next_sequence
         for sequence, payload, needed in saved.parcels:
             self._outbox.keep_payload(sequence, payload, -math.inf, needed=needed)
         self._answers.restore(saved.answered)
 
     def _heard(self, opened: Opened, payload: Content, now: float) -> Message | None:
-        """Message of a tube, None where its seal is not to be believed."""
+        """Return a tube's message; None where its seal is not believed."""
         seals = self._seals
         if seals is None:
             return decode_opened(opened)
@@ -210,7 +210,7 @@ class EndToEndDelivery:
         return message if seals.is_of(message, tube) else None
 
     def _told(self, opened: Opened, payload: Content, now: float) -> Message | None:
-        """Message of the base, None where its seal is not to be believed or it was for the seals alone."""
+        """Return the base's message; None where its seal is not believed, or it was for the seals alone."""
         seals = self._seals
         if seals is None:
             message = decode_opened(opened)
@@ -229,7 +229,7 @@ class EndToEndDelivery:
         return None if is_command and not seals.is_order_new(opened.sequence, self._answers.too_old) else message
 
     def _settle(self, receipt: Receipt) -> None:
-        """Forget what the ground station stored; a receipt for other content is of another life, or forged."""
+        """Forget a message that the ground station stored; a receipt of other content is stale or forged."""
         payload = self._outbox.payload(receipt.sequence)
         if payload is None:
             return
@@ -249,14 +249,14 @@ class EndToEndDelivery:
                 self._send_down(payload, open_payload(payload).target, Priority.COMMAND)
 
     def _send_up(self, payload: bytes) -> None:
-        """Send what must arrive to the base."""
+        """Send a payload that must arrive to the base."""
         if self._upper is None:
             self._counters["nowhere_to_go"] += 1
             return
         self._upper.send_reliable(payload if self._seals is None else self._seals.close_up(payload))
 
     def _send_down(self, payload: bytes, tube: int, priority: Priority) -> None:
-        """Send what must arrive to a tube; without a session under keys it waits for its repetition."""
+        """Send a payload that must arrive to a tube; without a session under keys it waits for its repetition."""
         if self._lower is None:
             self._counters["nowhere_to_go"] += 1
             return

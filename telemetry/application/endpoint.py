@@ -76,7 +76,7 @@ class Endpoint:
     boot_count : starts so far, kept by the process
     is_clock_root : whether the own clock is rig time
     restored : bytes of ``export_state`` before the restart, or None; damaged ones are counted and not used
-    reach : tubes away that are heard; beyond 1 the nearest that speaks is the neighbour, whoever lies silent between
+    reach : tubes away that are heard; beyond 1 the nearest that speaks is the neighbour, with silent tubes between
     seals : what is said and heard under keys; None: everybody is believed
     """
 
@@ -117,7 +117,7 @@ class Endpoint:
                 self.mail.restore(saved)
 
     def limit_bundles(self, side: Side, limit: int) -> None:
-        """Let payloads share a frame at one end only up to ``limit`` bytes: a large frame holds an urgent one up."""
+        """Limit the frames of several payloads at one end to ``limit`` bytes: a large frame delays an urgent one."""
         if side in self._links:
             self._links[side].bundle_limit = min(limit, BUNDLE_LIMIT)
 
@@ -152,7 +152,7 @@ class Endpoint:
             try:
                 content = payload if self.seals is None else self.seals.content(bytes(payload))
                 tube = state_origin(content) if is_relay else None
-                if tube is not None:  # as nearly always
+                if tube is not None:  # the usual case
                     self._pass_state(tube, payload)
                     continue
                 message = self._handle(side, open_payload(content), payload, now)
@@ -168,7 +168,7 @@ class Endpoint:
         return received
 
     def advance(self, now: float) -> None:
-        """Let time pass: neighbours that fell silent, hello, time requests, end-to-end repetition."""
+        """Advance to ``now`` (s): drop silent neighbours, send hello and time requests, repeat what is unreceipted."""
         self._standstill.move(now)
         for side, link in self._links.items():
             if self.place.neighbours[side] is not None and not link.is_up(now):
@@ -186,7 +186,7 @@ class Endpoint:
         self.mail.send_due(now)
 
     def take_frames(self, now: float) -> list[tuple[Side, PortFrame]]:
-        """Frames to put on the wire now."""
+        """Return the frames to send now, each with its end."""
         seals = self.seals
         if seals is None:
             frames: list[tuple[Side, PortFrame]] = []
@@ -218,7 +218,7 @@ class Endpoint:
             self._links[Side.LOWER].release()
 
     def ask_time(self, now: float) -> None:
-        """Compare clocks again at the quick pace: the epoch of rig time is another one."""
+        """Compare clocks again at the quick pace, because the epoch of rig time has changed."""
         self._sync_at = min(self._sync_at, now - SYNC_SLOW + SYNC_QUICK)
 
     def send_state(self, state: NodeState, now: float) -> None:
@@ -235,7 +235,7 @@ class Endpoint:
                 self.mail.go_with_states(now)
 
     def margin(self, side: Side) -> float:
-        """What the neighbour at one end is heard with over the radio's threshold, dB; infinite without radio or it."""
+        """Margin (dB) of the frames heard at one end over the radio's threshold; inf without radio or neighbour."""
         return math.inf if self.place.neighbours[side] is None else self._links[side].margin
 
     @property
@@ -260,12 +260,12 @@ class Endpoint:
 
     @property
     def dropped(self) -> int:
-        """What found no place in any queue since the start."""
+        """Number of messages without room in a queue since the start."""
         links = [link.counters for link in self._links.values()]
         return self.mail.dropped + sum([counters[name] for counters in links for name in DROPS])
 
     def export_state(self) -> bytes:
-        """What must survive a restart: numbers, unreceipted messages, answered commands."""
+        """Pack what a restart needs: numbers, unreceipted messages, answered commands."""
         return self.mail.export_state(self.place.hops)
 
     def _handle(self, side: Side, opened: Opened, payload: Content, now: float) -> Message | None:
@@ -312,13 +312,13 @@ class Endpoint:
         return self.mail.open_from_tube(opened, payload, now)
 
     def _is_measured(self, aiding: Aiding, now: float) -> bool:
-        """Whether the encoder measured what an aiding says; without keys everybody is believed."""
+        """Return whether an aiding is the encoder's measurement; without keys every one counts as such."""
         if self.seals is None or not self.clock.synchronised:
             return True  # what comes before rig time is known is not used
         return self.seals.measurement.admits(aiding, self.clock.epoch, self.clock.rig_from_local(now))
 
     def _pass(self, side: Side, opened: Opened, payload: Content) -> None:
-        """Hand on the very bytes that came."""
+        """Relay the bytes that came, unchanged."""
         link, kind = self._links.get(side), opened.kind
         if link is None:
             self.counters["nowhere_to_go"] += 1
@@ -338,7 +338,7 @@ class Endpoint:
 
     @property
     def _upper(self) -> int | None:
-        """Who is heard at the upper end."""
+        """Address of the neighbour at the upper end."""
         link = self._links.get(Side.UPPER)
         return None if link is None or link.peer is None else link.peer[0]
 

@@ -15,7 +15,7 @@ STATE_LAYOUT = "endpoint-1"  # of what is saved; counted up when it changes
 
 
 def layout_of(saved: bytes) -> str:
-    """Name of the layout of what ``Endpoint.export_state`` gave; "unnamed" where there is none."""
+    """Name of the layout of an exported state; "unnamed" if it has none."""
     try:
         name = msgpack.unpackb(saved)[0]
     except (ValueError, TypeError, LookupError, msgpack.UnpackException):
@@ -25,7 +25,7 @@ def layout_of(saved: bytes) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SavedState:
-    """Numbers, messages without a receipt (and whether each is needed), answers to commands, place in the string."""
+    """Numbers, messages without a receipt (and whether each must be kept), answers to commands, place in the string."""
 
     next_sequence: int
     parcels: list[tuple[int, bytes, bool]]
@@ -46,7 +46,7 @@ def parse_state(saved: bytes) -> SavedState:
     Raises
     ------
     DecodeError
-        When they are no state, or hold a message that is none; the process then starts without one.
+        When they are not a state, or hold an invalid message; the process then starts without one.
     """
     try:
         layout, next_sequence, parcels, answered, hops = msgpack.unpackb(saved, max_ext_len=0)
@@ -63,7 +63,7 @@ def parse_state(saved: bytes) -> SavedState:
 
 
 def is_needed(message: Message) -> bool:
-    """Whether a kept message is more than an event that may be lost for want of room."""
+    """Return whether a kept message must not be lost; an event may be, for want of room."""
     return not isinstance(message, Event) or message.severity is Severity.ERROR
 
 

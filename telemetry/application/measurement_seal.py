@@ -18,7 +18,7 @@ from telemetry.transport.seal import TAG_SIZE
 
 FIELDS = struct.Struct("<4dQd?I")  # yaw, its variance, rate, time, number, torque, under torque, epoch
 SEAL_SIZE = 1 + TAG_SIZE  # bytes: generation of the key, tag
-OLDEST = 5.0  # s of rig time, after which a measurement is somebody's recording
+OLDEST = 5.0  # s of rig time, after which a measurement counts as a recording
 
 
 class MeasurementSeal:
@@ -35,7 +35,7 @@ class MeasurementSeal:
         self._newest = (0, -1)  # epoch and number of the newest measurement believed
 
     def close(self, aiding: Aiding) -> Aiding:
-        """The aiding with its seal, under the oldest keys: all tubes below have those."""
+        """Return the aiding with its seal, under the oldest keys, which all tubes below have."""
         ring = self._ring()
         key = ring.seal_key(ring.oldest, "measurement")
         if key is None:
@@ -44,7 +44,7 @@ class MeasurementSeal:
         return replace(aiding, seal=generation + key.tag(generation, _measurement(aiding)))
 
     def admits(self, aiding: Aiding, epoch: int, rig_now: float) -> bool:
-        """Whether an aiding is to be believed at ``rig_now`` (s) of ``epoch``, which the sealed joints tell.
+        """Return whether an aiding is believed at ``rig_now`` (s) of ``epoch``, as the sealed joints tell it.
 
         A number that was believed is the same measurement again; a smaller one is an old one. One of another epoch is
         for the process to drop.

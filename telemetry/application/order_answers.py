@@ -33,18 +33,18 @@ class Answers:
             self.too_old = max(self.too_old, self._of_session.popleft())
 
     def payload(self, sequence: int) -> bytes:
-        """Answer to an order that is remembered."""
+        """Answer to an order that is kept."""
         return self._payloads[sequence]
 
     def begin_session(self) -> None:
-        """The base counts its orders anew."""
+        """Begin a session, in which the base counts its orders anew."""
         self._of_session.clear()
         self.too_old = 0
 
     def contents(self) -> list[tuple[int, bytes]]:
-        """All of them, to be saved."""
+        """All answers with the number of their order, to be saved."""
         return list(self._payloads.items())
 
     def restore(self, contents: list[tuple[int, bytes]]) -> None:
-        """Go on with what was saved."""
+        """Continue from saved answers."""
         self._payloads.update(contents)

@@ -39,7 +39,7 @@ class Outbox:
         return len(self._parcels)
 
     def keep_payload(self, sequence: int, payload: bytes, due: float, *, needed: bool = True) -> None:
-        """Keep a payload that is due at a time (s). What is not ``needed`` goes first where there is no place."""
+        """Keep a payload that is due at ``due`` (s). One that is not ``needed`` goes first when room runs out."""
         self._parcels[sequence] = Parcel(payload, due, needed=needed)
         if len(self._parcels) > self._limit:
             oldest = next((n for n, parcel in self._parcels.items() if not parcel.needed), next(iter(self._parcels)))
@@ -56,7 +56,7 @@ class Outbox:
         return self._parcels.pop(sequence, None) is not None
 
     def due_payloads(self, now: float) -> Iterator[bytes]:
-        """Payloads to send now; each is due again later, with growing patience."""
+        """Payloads to send now; each is due again later, at growing intervals."""
         for parcel in self._parcels.values():
             if parcel.send_at <= now:
                 parcel.send_at, parcel.was_sent = now + parcel.wait, True
@@ -69,7 +69,7 @@ class Outbox:
         self._waiting.append(sequence)
 
     def release(self, now: float) -> bool:
-        """Have what waited for others to go with sent now; whether anything did."""
+        """Make the payloads due that wait for others to go with; returns whether there were any."""
         hastened = False
         while self._waiting:
             parcel = self._parcels.get(self._waiting.popleft())
@@ -78,14 +78,14 @@ class Outbox:
         return hastened
 
     def make_due(self, now: float) -> None:
-        """Have everything sent again now: whoever has it to take can, from now on."""
+        """Make everything due now: its receiver can take it from now on."""
         for parcel in self._parcels.values():
             parcel.send_at = now
 
     def next_due(self) -> float:
-        """When something is due, infinite if nothing is kept."""
+        """Time (s) at which something is due, infinite if nothing is kept."""
         return min((parcel.send_at for parcel in self._parcels.values()), default=math.inf)
 
     def contents(self) -> list[list[int | bytes]]:
-        """What to save: sequence numbers and payloads."""
+        """Sequence numbers and payloads to save."""
         return [[sequence, parcel.payload] for sequence, parcel in self._parcels.items()]

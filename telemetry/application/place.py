@@ -12,7 +12,7 @@ from telemetry.transport.nearest import Nearest
 
 
 class Neighbour(NamedTuple):
-    """Who is at the other side of a joint."""
+    """Process at the other side of a joint."""
 
     tube: int
     boot_count: int
@@ -23,18 +23,18 @@ class Neighbour(NamedTuple):
 
 
 class StringPlace:
-    """What a process knows of its place.
+    """Place of a process in the string.
 
     Parameters
     ----------
     address : ``BASE``, ``ENCODER`` or the tube's number
-    reach : tubes away that are heard; beyond 1 the nearest that speaks is the neighbour, whoever lies silent between
+    reach : tubes away that are heard; beyond 1 the nearest that speaks is the neighbour, with silent tubes between
     counters : of what cannot be
 
     Attributes
     ----------
-    hops : to the encoder, those of silent tubes included; ``HOPS_UNKNOWN`` before anybody told
-    neighbours : by end, None where nobody is heard
+    hops : to the encoder, those of silent tubes included; ``HOPS_UNKNOWN`` before a neighbour told it
+    neighbours : by end, None where none is heard
     """
 
     def __init__(self, address: int, reach: int, counters: Counter[str]) -> None:
@@ -49,7 +49,7 @@ class StringPlace:
         return self.hops if self._is_told else HOPS_UNKNOWN
 
     def nearest(self, side: Side) -> Nearest | None:
-        """Who is chosen at an end; base station and encoder are joined by a cable, where one alone is heard."""
+        """Choice among the neighbours heard at one end; None at a cable (base station to encoder) or at reach 1."""
         cable = self._address == BASE or (self._address == ENCODER and side is Side.UPPER)
         return None if self._reach == 1 or cable else Nearest(partial(self.distance, side))
 
@@ -68,13 +68,13 @@ class StringPlace:
         return away if 0.0 < away < self._reach + 1.0 else math.inf
 
     def skipped(self, upper: int | None) -> int:
-        """Silent tubes between this one and ``upper``, which is heard at its upper end; None: nobody is."""
+        """Number of silent tubes between this one and ``upper``, heard at its upper end (None: no tube is heard)."""
         if self._reach == 1 or self._address in (BASE, ENCODER) or upper is None:
             return 0
         return int(min(self.distance(Side.UPPER, upper), self._reach)) - 1
 
     def meet(self, side: Side, hello: Hello, upper: int | None, quality: float, now: float) -> bool:
-        """Take a neighbour's hello (s, own clock); whether it moves this process in the string.
+        """Take a neighbour's hello at ``now`` (s, own clock); returns whether it moves this process in the string.
 
         One that puts it farther from the encoder than any tube can be is counted.
         """

@@ -30,7 +30,7 @@ class SealWatch:
         self._told_at = -math.inf
 
     def look(self, now: float) -> None:
-        """Look at ``now`` (s, own clock)."""
+        """Report new refusals at ``now`` (s, own clock)."""
         if now < self._told_at + TELL_EVERY or not (fresh := self.fresh()):
             return
         self._told_at, self._told = now, self._told | fresh

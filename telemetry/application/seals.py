@@ -51,7 +51,7 @@ class Keys:
         return self.ring
 
     def refresh(self) -> bool:
-        """Read the file again if it has changed; whether the keys are others. A file that is wrong changes nothing."""
+        """Read the file again if it has changed; returns whether the keys changed. An invalid file changes nothing."""
         stamp = self._stamp()
         if stamp == self._read:
             return False
@@ -103,19 +103,19 @@ class Seals:
 
     @staticmethod
     def content(payload: bytes) -> bytes:
-        """What a payload says, its seal unread; a relay needs no more."""
+        """Return the content of a payload without a look at its seal; a relay needs no more."""
         return content_of_sealed(payload)
 
     def hear(self, payload: bytes, tube: int, now: float) -> SealFinding:
-        """What the base makes of a payload from a tube."""
+        """Judge a payload from a tube, at the base."""
         return SealFinding.NOTHING if self.base is None else self.base.open(payload, tube, now)
 
     def is_told(self, payload: bytes, now: float, *, is_offer: bool) -> bool:
-        """Whether a tube believes a payload from the base."""
+        """Return whether a tube believes a payload from the base."""
         return self.tube is not None and self.tube.open(payload, now, is_offer=is_offer)
 
     def is_of(self, message: Message, tube: int) -> bool:
-        """Whether a message speaks of the tube whose seal it came under, and a state is newer than the last."""
+        """Return whether a message is of the tube whose seal it came under and, for a state, newer than the last."""
         end = self.base or self.tube
         if end is not None and getattr(message, "tube", None) != tube:
             end.counters["seal_end_spliced"] += 1
@@ -123,17 +123,17 @@ class Seals:
         return self.base is None or not isinstance(message, NodeState) or self.base.is_next_state(tube, message.cycles)
 
     def is_order_new(self, number: int, too_old: int) -> bool:
-        """Whether a tube has not forgotten so old an order."""
+        """Return whether an order is newer than all that a tube has forgotten."""
         if number <= too_old and self.tube is not None:
             self.tube.counters["seal_end_old_order"] += 1
         return number > too_old
 
     def close_up(self, payload: bytes) -> bytes:
-        """Payload for the base."""
+        """Seal a payload for the base."""
         return payload if self.tube is None else self.tube.close(payload)
 
     def close_down(self, payload: bytes, tube: int) -> bytes | None:
-        """Payload for a tube; None where there is no session with it."""
+        """Seal a payload for a tube; None without a session."""
         return None if self.base is None else self.base.close(payload, tube)
 
     def due_offers(self) -> list[tuple[int, bytes]]:
@@ -141,7 +141,7 @@ class Seals:
         return [] if self.base is None else self.base.due_offers(lambda tube: encode(SessionOffer(tube)))
 
     def next_wake(self) -> float:
-        """When ``frames_of`` has something to send by itself (s), infinite if never."""
+        """Time (s) at which ``frames_of`` has something to send by itself, infinite if never."""
         return min(joint.next_wake() for joint in self.joints.values())
 
     def depth_content(self, payload: bytes) -> bytes | None:
@@ -152,7 +152,7 @@ class Seals:
         return content
 
     def is_next_depth(self, number: int) -> bool:
-        """Whether a reading of the depth is newer than all before; rig time bounds what comes after a restart."""
+        """Return whether a reading of the depth is newer than all before; after a restart rig time bounds it."""
         if number <= self._depth_number:
             self._depth_counters["seal_depth_repeated"] += 1
             return False
@@ -161,7 +161,7 @@ class Seals:
 
     @property
     def block_keys(self) -> list[bytes]:
-        """Keys of which one is that of a segment of a parameter block for this tube."""
+        """Candidate keys of a segment of a parameter block for this tube, one a generation."""
         ring = self._keys.ring
         keys = [generation.keys.get(("block", ring.address)) for generation in ring.generations]
         return [key for key in keys if key is not None]
@@ -178,13 +178,13 @@ class Seals:
 
     @property
     def trouble(self) -> str:
-        """Why the key file as it is now is not used, or what is odd about the keys in use; or empty."""
+        """Fault of the key file, or warnings on the keys in use; empty if there are none."""
         return self._keys.fault or "; ".join(self._keys.ring.warnings)
 
     def frames_of(self, side: Side, frames: Iterable[PortFrame], now: float) -> list[PortFrame]:
         """Sealed frames of a link, and before them the call or answer that is due at ``now`` (s).
 
-        What a link sends to nobody is dropped: a clock exchange must not wait, and the link repeats the rest.
+        Frames of a link without a partner are dropped: a clock exchange must not wait, and the link repeats the rest.
         """
         joint = self.joints[side]
         sealed = [PortFrame(payload, Priority.HELLO, "call") for payload in joint.own_frames(now)]
@@ -195,7 +195,7 @@ class Seals:
         return sealed
 
     def advance(self, now: float) -> None:
-        """Let time pass to ``now`` (s): look at the key file, count what nobody has proven."""
+        """Let time pass to ``now`` (s): look at the key file, count what was not proven in time."""
         if self.base is not None:
             self.base.count_unproven(now)
         if now < self._looked_at + LOOK_EVERY:
@@ -208,7 +208,7 @@ class Seals:
                 self.base.forget_revoked()
 
     def counters(self) -> Counter[str]:
-        """Counts of what was of no effect, of every seal."""
+        """Counts of refused frames and payloads, of every seal."""
         total = self.measurement.counters + self._depth_counters
         for one in (*self.joints.values(), self.base, self.tube):
             if one is not None:
@@ -216,7 +216,7 @@ class Seals:
         return total
 
     def failures(self) -> dict[str, int]:
-        """Those counts that somebody should know of."""
+        """Counters of failures, by name."""
         return {name: count for name, count in self.counters().items() if name not in NO_FAILURES}
 
 

@@ -31,20 +31,20 @@ TICK = 0.05  # s, that a controller is waited for
 
 
 class CanController(Protocol):
-    """One controller; what fails raises ``can.CanError``, ``OSError`` or ``ValueError``."""
+    """One controller; failures raise ``can.CanError``, ``OSError`` or ``ValueError``."""
 
     def send(self, identifier: int, data: bytes) -> None:
         """Hand over a frame of 29 bits, which the controller repeats until it is acknowledged."""
 
     def receive(self) -> Arrival | None:
-        """The next frame, ``OWN_FRAME`` among its flags where it is an own one; None where none comes in ``TICK``."""
+        """Return the next frame (``OWN_FRAME`` is set on an own one); None if none comes within ``TICK`` s."""
 
     def shutdown(self) -> None:
-        """Let the bus go."""
+        """Close the bus."""
 
 
 def controller_of(bus: can.BusABC, *, is_fd: bool, log: CanLog | None) -> CanController:
-    """The quickest way to the controller of ``bus``."""
+    """Return the fastest controller for ``bus``."""
     if log is None and isinstance(bus, LoopbackBus):
         return LoopbackController(bus, is_fd=is_fd)
     if log is None and isinstance(bus, SocketcanBus):
@@ -80,7 +80,7 @@ class LibraryController:
         return identifier_of(message) | (0 if message.is_rx else OWN_FRAME), bytes(message.data)
 
     def shutdown(self) -> None:
-        """Let the bus go."""
+        """Close the bus."""
         self._bus.shutdown()
 
 
@@ -102,7 +102,7 @@ class LoopbackController:
         return self._bus.take()
 
     def shutdown(self) -> None:
-        """Let the bus go."""
+        """Close the bus."""
         self._bus.shutdown()
 
 
@@ -130,12 +130,12 @@ class KernelController:
         return identifier | (OWN_FRAME if flags & socket.MSG_DONTROUTE else 0), frame[HEADER : HEADER + length]
 
     def shutdown(self) -> None:
-        """Let the bus go."""
+        """Close the bus."""
         self._bus.shutdown()
 
 
 def wait_at_most(endpoint: socket.socket, seconds: float) -> None:
-    """Have the system itself end a wait for a datagram: one call a frame, where Python asks first whether one is there.
+    """Let the system end a wait for a datagram: one call a frame, where Python would first ask whether one is there.
 
     A system of 32 bits may want another layout of a time; there Python asks.
     """

@@ -1,9 +1,9 @@
 """One end of a CAN joint as a pure state machine: payloads in and out of frames, one frame at a time.
 
 Never more than one frame is with the controller, so an urgent payload waits for the end of one frame and no longer: it
-begins between two frames of a less urgent one. A frame that nobody acknowledges for ``ACKNOWLEDGE_LIMIT`` means that
+begins between two frames of a less urgent one. A frame unacknowledged for ``ACKNOWLEDGE_LIMIT`` means that
 the joint is open. Then everything waits in the bounded queue but that frame, a mere sign of life, which the controller
-repeats until somebody acknowledges it.
+repeats until it is acknowledged.
 """
 
 from __future__ import annotations
@@ -78,16 +78,16 @@ class Outgoing:
 
     @property
     def awaits_flow(self) -> bool:
-        """Whether the receiver has to answer first."""
+        """Whether the receiver must answer first."""
         return not self._parts and self._sender is not None and self._sender.awaits_flow
 
     @property
     def is_done(self) -> bool:
-        """Whether nothing is left."""
+        """Whether all is sent."""
         return not self._parts and (self._sender is None or self._sender.is_done)
 
     def next_frame(self, address: int) -> CanData:
-        """The next frame; not while the receiver is waited for, nor when it is done."""
+        """Return the next frame; not while it awaits flow control, nor when it is done."""
         if self._parts:
             return part_data(self._parts.popleft(), address)
         if self._sender is None:
@@ -95,7 +95,7 @@ class Outgoing:
         return CanData(packed_identifier(self.frame.priority, TUNNEL, address), self._sender.next_frame())
 
     def on_flow(self, data: bytes) -> None:
-        """Take the receiver's answer, see ``isotp.Sender``."""
+        """Take the receiver's flow control, see ``isotp.Sender``."""
         if self._sender is not None and not self._parts:
             self._sender.on_flow(data)
 
@@ -109,7 +109,7 @@ class Incoming:
 
 
 class BusLoadMeter:
-    """Share of its time that the bus was busy lately, both directions: a mean that forgets with ``MEMORY``."""
+    """Share of time in which the bus was busy lately, both directions: a mean that forgets with ``MEMORY``."""
 
     def __init__(self, rates: BitRates, *, fd: bool) -> None:
         self._rates, self._fd = rates, fd
@@ -131,13 +131,13 @@ class BusLoadMeter:
 
 
 class Budget:
-    """How many payloads of each priority may come in: a babbling neighbour must not fill the links above."""
+    """Limit on incoming payloads by priority: a babbling neighbour must not fill the links above."""
 
     def __init__(self) -> None:
         self._left = {priority: (BUDGET_BURST * rate, 0.0) for priority, rate in BUDGETS.items()}  # and since when
 
     def allows(self, priority: Priority, now: float) -> bool:
-        """Take one payload from the budget of its priority, if any is left."""
+        """Take one payload from the budget of its priority; returns whether any was left."""
         left, at = self._left[priority]
         rate = BUDGETS[priority]
         left = min(left + rate * max(now - at, 0.0), BUDGET_BURST * rate)
@@ -193,24 +193,24 @@ class CanExchange:
         self._incoming: dict[Priority, Incoming] = {}
 
     def on_acknowledged(self, now: float) -> None:
-        """The frame that is with the controller has arrived."""
+        """Note that the frame with the controller has arrived."""
         self._in_flight_since = None
         self._acknowledged_at = now
         self.is_up = not self.is_mute
 
     def is_alone(self, now: float) -> bool:
-        """Whether nobody has been there for some time, or ever."""
+        """Return whether the other end has been silent for longer than ``SILENCE`` s, or ever."""
         return not self.is_up and now - self._acknowledged_at > SILENCE
 
     def on_refused(self) -> None:
-        """The controller took no frame, or has forgotten it."""
+        """Note that the controller refused its frame, or lost it."""
         self._in_flight_since = None
         self._go_down()
         self._put_back()
         self._presence_is_due = True
 
     def on_frame(self, bits: int, data: bytes, now: float) -> Content | None:
-        """Take a frame of somebody else; returns the payload it completes. Garbage is counted."""
+        """Take a frame of another controller; returns the payload it completes. Garbage is counted."""
         self.traffic.add(len(data), now)
         payload = self._take(bits, data, now)
         if payload is not None and self.budget is not None and not self.budget.allows(PRIORITIES[bits >> 26], now):
@@ -238,7 +238,7 @@ class CanExchange:
         return None
 
     def advance(self, now: float) -> None:
-        """Let time pass: an end that does not acknowledge, transfers that stand still."""
+        """Advance to ``now`` (s): find an end that does not acknowledge, and transfers that stand still."""
         since = self._in_flight_since
         if since is not None and now - since > self._acknowledge_limit:
             self._go_down()
@@ -279,13 +279,13 @@ class CanExchange:
         return self._continue(min(ready), now) if ready else None
 
     def _presence(self, now: float) -> CanData:
-        """Sign of life: how long this end is here (ms), and its nonce, by which two of one address are told apart."""
+        """Sign of life: age of this end (ms) and its nonce, which tells two ends of one address apart."""
         age = min(int(1e3 * (now - self._begun)), 0xFFFFFFFF)
         identifier = packed_identifier(Priority.HELLO, PRESENCE, self.address, self._nonce & PART_MASK)
         return CanData(identifier, age.to_bytes(4) + self._nonce.to_bytes(4))
 
     def _start(self, now: float) -> CanData | None:
-        """Begin the most urgent payload that waits, where it is more urgent than all that are on their way.
+        """Begin the most urgent waiting payload, if it is more urgent than all under way.
 
         Returns its frame where one part of a form of its own is all of it.
         """
@@ -311,13 +311,13 @@ class CanExchange:
         return data
 
     def _on_part(self, source: int, type_: int, part: int, data: bytes) -> Content | None:
-        """Take a part of a message that has a form of its own."""
+        """Take a part of a message that has signals of its own."""
         if self.profile is None:
             self.counters["unknown_identifier"] += 1
             return None
         try:
             return self.profile.join(source, type_, part, data)
-        except TelemetryError as error:  # of a message that is none, or that nobody could have written
+        except TelemetryError as error:  # of an invalid message, or one that no encoder could have written
             name, _, why = str(error).partition(":")  # counted without the value, of which there is no end
             self.counters[f"refused: {name}" if why else name] += 1
         return None
@@ -350,9 +350,9 @@ class CanExchange:
             del self._outgoing[priority]
 
     def _go_down(self) -> None:
-        """Nobody is there: what must not be lost stands still on its way, the rest of what was on it is forgotten.
+        """Take the other end for absent: hold transfers that must not be lost, drop the others under way.
 
-        A machine at work may do nothing for as long, and then goes on where it was.
+        A busy machine may be as silent; what was held then goes on where it stopped.
         """
         self.is_up = False
         for priority, outgoing in list(self._outgoing.items()):
@@ -362,20 +362,20 @@ class CanExchange:
         self.queue.forget_outdated()
 
     def _put_back(self) -> None:
-        """What was on its way waits again, to begin anew."""
+        """Put everything under way back into the queue, to begin anew."""
         for outgoing in self._outgoing.values():
             self.queue.put_back(outgoing.frame)
         self._outgoing.clear()
 
     def _is_partner(self, source: int, now: float) -> bool:
-        """Whether this is the other end of the joint; a third talker is not heard while that one is."""
+        """Return whether ``source`` is the other end of the joint; a third talker is ignored while that is heard."""
         if source != self.partner and now - self._heard_at <= SILENCE and self.partner is not None:
             return False
         self.partner, self._heard_at = source, now
         return True
 
     def _on_double(self, type_: int, data: bytes, now: float) -> None:
-        """Somebody else has this address: the younger falls silent, the older shows itself."""
+        """Handle another controller with this address: the younger falls silent, the older shows itself."""
         self.counters["same_address"] += 1
         if type_ != PRESENCE or len(data) != 8:
             self._presence_is_due = not self.is_mute

@@ -35,12 +35,12 @@ class CanFrame:
 
     @property
     def is_error(self) -> bool:
-        """Whether the controller reports an error by it."""
+        """Whether the frame is an error report of the controller."""
         return bool(self.can_id & ERROR)
 
     @property
     def rank(self) -> int:
-        """What arbitration compares, the smaller wins: an identifier of 11 bit before one of 29 with the same start."""
+        """Rank in arbitration, the smaller wins: an identifier of 11 bit before one of 29 with the same start."""
         if self.can_id & EXTENDED:
             return (self.can_id & IDENTIFIER) << 1 | 1
         return (self.can_id & 0x7FF) << 19
@@ -58,7 +58,7 @@ def unpack_frame(datagram: bytes) -> tuple[CanFrame, int]:
     Raises
     ------
     ValueError
-        When the bytes are no frame.
+        When the bytes are not a frame.
     """
     fd = len(datagram) == FD.size
     if not fd and len(datagram) != CLASSIC.size:
@@ -70,16 +70,16 @@ def unpack_frame(datagram: bytes) -> tuple[CanFrame, int]:
 
 
 def is_frame(datagram: bytes) -> bool:
-    """Whether ``unpack_frame`` takes it."""
+    """Return whether ``unpack_frame`` accepts the datagram."""
     return len(datagram) in (FD.size, CLASSIC.size) and datagram[LENGTH_AT] <= len(datagram) - HEADER
 
 
 def arrival_of(datagram: bytes) -> Arrival:
-    """What ``unpack_frame`` finds, as a port takes it; of what is a frame."""
+    """Return identifier and data of a datagram that is a frame, as a port takes them."""
     identifier, length = HEAD.unpack_from(datagram)
     return identifier | (OWN_FRAME if datagram[OWN_AT] & OWN else 0), datagram[HEADER : HEADER + length]
 
 
 def error_frame(error_class: int, detail: int = 0) -> CanFrame:
-    """What a controller reports to its own computer."""
+    """Return a frame by which a controller reports an error to its own computer."""
     return CanFrame(ERROR | error_class, bytes([0, detail, 0, 0, 0, 0, 0, 0]))

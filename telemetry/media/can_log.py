@@ -34,7 +34,7 @@ class CanLog:
             raise MediumError(f"log {self.path}: {error.strerror}") from error
 
     def write(self, message: can.Message) -> None:
-        """Put a message into the log."""
+        """Write a message to the log."""
         if self._writer is None:
             return
         try:

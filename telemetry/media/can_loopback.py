@@ -105,7 +105,7 @@ class LoopbackBus(can.BusABC):
             raise can.CanOperationError(f"{self.channel_info}: {error.strerror}", error.errno) from error
 
     def restart(self) -> None:
-        """Take part again after bus-off."""
+        """Rejoin the bus after bus-off."""
         self.socket.send(RESTART)
 
     def fileno(self) -> int:
@@ -135,7 +135,7 @@ class LoopbackBus(can.BusABC):
             )
 
     def take(self) -> Arrival | None:
-        """The frame that waits, without python-can's message of it; None where none comes while the socket waits.
+        """Return the waiting frame, without python-can's message of it; None if none comes while the socket waits.
 
         Raises
         ------
@@ -160,7 +160,7 @@ class LoopbackBus(can.BusABC):
         return None if datagram is None else message_of(unpack_frame(datagram)[0], self.channel_info), False
 
     def _next_datagram(self) -> bytes | None:
-        """The frame that waits, counted; None where there is none, or something else."""
+        """Return the waiting frame, counted; None if there is none, or other bytes."""
         try:
             datagram = self.socket.recv(LARGEST_DATAGRAM)
         except (BlockingIOError, TimeoutError):
@@ -177,7 +177,7 @@ class LoopbackBus(can.BusABC):
         return datagram
 
     def _make_sure_of_hub(self) -> None:
-        """Say that this controller is here: a hub that has gone, maybe with a frame of ours, shows by an error."""
+        """Report this controller to the hub: one that has gone, maybe with a frame of ours, shows by an error."""
         now = time.monotonic()
         if now >= self._ask_at:
             self._ask_at = now + ASK_EVERY
@@ -187,7 +187,7 @@ class LoopbackBus(can.BusABC):
                 raise can.CanOperationError(f"{self.channel_info}: {error.strerror}", error.errno) from error
 
     def _watch_count(self, count: int) -> None:
-        """Notice frames that found no room in the receive buffer."""
+        """Count frames lost for want of room in the receive buffer."""
         missed = (count - self._count - 1) & 0xFF
         self._count = count
         if missed:
@@ -202,7 +202,7 @@ def identifier_of(msg: can.Message) -> int:
 
 
 def message_of(frame: CanFrame, channel: str) -> can.Message:
-    """Frame as python-can hands it out."""
+    """Return a frame as a message of python-can."""
     return can.Message(
         timestamp=time.time(),
         arbitration_id=frame.can_id & IDENTIFIER,

@@ -41,7 +41,7 @@ FRAMES = {"fd": FD_LARGEST, "classic": CLASSIC_LARGEST}
 
 @dataclass(frozen=True, slots=True)
 class CanSettings:
-    """What follows ``can:``."""
+    """Settings after ``can:``."""
 
     channel: str
     interface: str = "socketcan"
@@ -82,7 +82,7 @@ class CanSettings:
 
     @property
     def rates(self) -> BitRates:
-        """Bit rates, where they were given; of an interface that was set up before, such as can0, they may be too."""
+        """Bit rates, if given; also allowed for an interface that was set up before, such as can0."""
         return BitRates(self.bitrates.get("bitrate", 0), self.bitrates.get("data_bitrate", 0))
 
     def open_bus(self, segment: str) -> can.BusABC:

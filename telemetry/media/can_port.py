@@ -109,7 +109,7 @@ class CanPort(QueuedPort):
             self._deliver = deliver
 
     def close(self) -> None:
-        """Let the end go."""
+        """Close this end."""
         with self._lock:
             if self._closed:
                 return
@@ -169,7 +169,7 @@ class CanPort(QueuedPort):
             self.counters["receive_overruns"] += 1
 
     def _look(self, read_until: float) -> None:
-        """Let time pass up to when (s) all that the controller had is known to have been read.
+        """Advance the exchange to ``read_until`` (s), up to which the controller's frames are known to be read.
 
         What is missing may lie there unread, where this thread had no time to read it.
         """
@@ -218,7 +218,7 @@ class CanPort(QueuedPort):
 
 
 def open_controller(open_bus: OpenBus, name: str, is_fd: bool, log: CanLog | None) -> CanController:
-    """The controller, its errors as ours.
+    """Open a controller; its errors are raised as errors of ours.
 
     Raises
     ------

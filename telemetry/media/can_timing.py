@@ -33,11 +33,11 @@ class BitRates:
 
     @property
     def error_duration(self) -> float:
-        """Of an error frame, s."""
+        """Duration of an error frame, s."""
         return ERROR_FRAME / self.nominal if self.is_paced else 0.0
 
     def duration(self, length: int, *, fd: bool) -> float:
-        """Of a frame with ``length`` bytes of data, s; the longest that stuffing can make it."""
+        """Duration of a frame with ``length`` bytes of data, s, at the worst case of stuffing."""
         if not self.is_paced:
             return 0.0
         if not fd:

@@ -63,7 +63,7 @@ def credentials_of(place: Path, name: str) -> Credentials:
 
 
 def needs_tls(endpoint: str) -> bool:
-    """Whether an endpoint is on a network where anybody could listen and speak: neither TLS nor this machine alone."""
+    """Return whether an endpoint is on an open network: neither TLS nor this machine alone."""
     protocol, _, place = endpoint.partition("/")
     host = place.rpartition(":")[0].strip("[]")
     if protocol not in OVER_A_NETWORK:

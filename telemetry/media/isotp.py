@@ -1,6 +1,6 @@
 """ISO-TP (ISO 15765-2) as pure state machines: payloads in frames of 8 or 64 bytes, over classic CAN and CAN FD.
 
-A sender hands out one frame at a time, so that whoever drives it can let an urgent frame go between two of a long
+A sender hands out one frame at a time, so that its caller can let an urgent frame go between two of a long
 payload. Normal addressing: the identifier says whose transfer it is. One departure: a single frame may be empty.
 """
 
@@ -18,7 +18,7 @@ PADDING = 0xCC
 
 
 class FlowStatus(IntEnum):
-    """What a receiver answers."""
+    """Answer of a receiver."""
 
     CONTINUE = 0
     WAIT = 1
@@ -26,7 +26,7 @@ class FlowStatus(IntEnum):
 
 
 class TransferError(MediumError):
-    """A transfer that came to nothing; the message is the name under which it is counted."""
+    """A transfer failed; the message is the name under which it is counted."""
 
 
 class Sender:
@@ -47,11 +47,11 @@ class Sender:
 
     @property
     def awaits_flow(self) -> bool:
-        """Whether the receiver has to answer first."""
+        """Whether the receiver must answer first."""
         return self._allowed == 0
 
     def next_frame(self) -> bytes:
-        """Data of the next frame; not while the receiver is waited for, nor when it is done."""
+        """Return data of the next frame; not while it awaits flow control, nor when it is done."""
         if self._sent:
             frame = self._consecutive()
         elif (single := self._single()) is not None:
@@ -64,7 +64,7 @@ class Sender:
         return padded_frame(frame, self._largest)
 
     def on_flow(self, data: bytes) -> None:
-        """Take the receiver's answer.
+        """Take the receiver's flow control.
 
         Raises
         ------

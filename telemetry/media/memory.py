@@ -46,13 +46,13 @@ class MemoryPort(QueuedPort):
         self._deliver = deliver
 
     def advance(self, now: float) -> None:
-        """Deliver what has arrived by ``now`` (s), from which on frames leave."""
+        """Advance to ``now`` (s) and deliver what has arrived by then."""
         self.now = now
         while self._arriving and self._arriving[0][0] <= now and self._deliver is not None:
             self._deliver(heapq.heappop(self._arriving)[2])
 
     def close(self) -> None:
-        """Let the end go."""
+        """Close this end."""
         self._closed, self._deliver = True, None
 
     def _is_heard(self) -> bool:
@@ -110,7 +110,7 @@ class MemoryMedium:
 
 
 def end_identity(end: TubeEnd) -> tuple[str, int, int]:
-    """What makes an end the same end."""
+    """Key of an end: rig, address and side."""
     return end.rig, end.address, int(end.side)
 
 

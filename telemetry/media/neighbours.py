@@ -21,7 +21,7 @@ def own_ports(
 ) -> Iterator[dict[Side, Port]]:
     """Ends of a process with a clock of its own, open inside the context; ends on one medium share it.
 
-    ``neighbours`` holds None where the medium finds whoever is there; ``media`` names the medium of each end.
+    ``neighbours`` holds None where the medium finds the neighbour; ``media`` names the medium of each end.
 
     Raises
     ------

@@ -17,7 +17,7 @@ from telemetry.messages import Side
 from telemetry.unwritten import Content, Unwritten
 
 MAX_FRAME = 49152  # bytes, largest frame of the hop link: states of 170 tubes; zenoh takes 64 KiB in one piece
-STEPPER = 254  # in place of a neighbour's address: whoever hands a stepped process its frames
+STEPPER = 254  # in place of a neighbour's address: what hands a stepped process its frames
 
 
 class Priority(IntEnum):
@@ -33,7 +33,7 @@ class Priority(IntEnum):
 
 
 class PortFrame(NamedTuple):
-    """What a link hands to its port.
+    """A frame of a link for its port.
 
     Parameters
     ----------
@@ -48,11 +48,11 @@ class PortFrame(NamedTuple):
 
     @property
     def payload(self) -> bytes:
-        """The bytes on the wire."""
+        """Bytes on the wire."""
         return bytes(self.content)
 
     def is_larger_than(self, largest: int) -> bool:
-        """Whether it takes more bytes than that."""
+        """Return whether the frame is larger than ``largest`` bytes."""
         content = self.content
         if isinstance(content, Unwritten) and content.most <= largest:
             return False
@@ -61,7 +61,7 @@ class PortFrame(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class TubeEnd:
-    """Which end of which process a port serves, and whose port it faces."""
+    """End that a port serves, and the one it faces."""
 
     rig: str
     address: int
@@ -70,7 +70,7 @@ class TubeEnd:
 
     @property
     def facing(self) -> TubeEnd:
-        """The end that this one looks into.
+        """End at the other side of the joint.
 
         Raises
         ------
@@ -96,7 +96,7 @@ class Port(Protocol):
 
     @property
     def is_up(self) -> bool:
-        """Whether somebody listens at the other end."""
+        """Whether there is a listener at the other end."""
 
     @property
     def counters(self) -> Counter[str]:
@@ -124,7 +124,7 @@ class Port(Protocol):
         """Call ``deliver``, which must never wait, for every frame that arrives; maybe on another thread."""
 
     def close(self) -> None:
-        """Let the end go; the other end sees that nobody listens. A second call does nothing."""
+        """Close this end; the other end sees that it has no listener. A second call does nothing."""
 
 
 class Medium(Protocol):

@@ -37,7 +37,7 @@ class QueuedPort(ABC):
 
     @property
     def is_up(self) -> bool:
-        """Whether somebody listens at the other end."""
+        """Whether there is a listener at the other end."""
         return not self._closed and self._is_heard()
 
     @property
@@ -62,8 +62,8 @@ class QueuedPort(ABC):
 
     @abstractmethod
     def _is_heard(self) -> bool:
-        """Whether somebody listens at the other end of an open port."""
+        """Return whether there is a listener at the other end of an open port."""
 
     @abstractmethod
     def _drain(self) -> None:
-        """Put on the bus what the queue holds, if the other end is there."""
+        """Put the queue on the bus while the other end is there."""

@@ -32,7 +32,7 @@ class SendQueue:
         return len(self._waiting)
 
     def offer(self, frame: PortFrame) -> bool:
-        """Put a frame in; returns False for one that is too large."""
+        """Queue a frame; returns False for one that is too large."""
         if frame.is_larger_than(self.largest):
             self.counters["too_large"] += 1
             return False
@@ -43,7 +43,7 @@ class SendQueue:
         return True
 
     def drain(self, is_up: Callable[[], bool], put: Callable[[bytes], None]) -> None:
-        """Hand frames to ``put`` while ``is_up``; a clock exchange that has to wait is forgotten."""
+        """Hand frames to ``put`` while ``is_up``; a clock exchange that has to wait is dropped."""
         while self._waiting and is_up():
             frame = self.take()
             if frame is not None:
@@ -59,7 +59,7 @@ class SendQueue:
         return None if chosen is None else self._waiting.pop(chosen)
 
     def put_back(self, frame: PortFrame) -> None:
-        """Put a frame that was taken to its place before the others again."""
+        """Put a frame that was taken back before the others."""
         self._waiting.insert(0, frame)
         if len(self._waiting) > self.limit:
             self._remove("dropped", [self._most_dispensable()])
@@ -70,7 +70,7 @@ class SendQueue:
             self._remove("outdated", [f for f in self._waiting if f.priority is Priority.TIME])
 
     def _replace(self, frame: PortFrame) -> bool:
-        """Put a frame into the place of the one of its topic, so that of many topics none is always last."""
+        """Replace the waiting frame of the same topic in its place, so that of many topics none is always last."""
         if frame.topic is None:
             return False
         for place, other in enumerate(self._waiting):

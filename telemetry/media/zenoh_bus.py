@@ -44,7 +44,7 @@ class Publisher:
         self._heard: dict[str, bool] = {}  # what was told of it last, once it is watched
 
     def watch(self) -> None:
-        """Be told from now on whether anybody subscribes: to ask takes longer than to put, which is done each time."""
+        """Watch from now on whether there are subscribers: asking takes longer than the put before which it is done."""
 
         def note(status: Any) -> None:
             self._heard["now"] = bool(status.matching)
@@ -107,7 +107,7 @@ class Query:
         self._query.reply(key, payload, encoding=encoding)
 
     def finish(self) -> None:
-        """Tell the asker that no more answers come; for queries of ``queryable_kept``."""
+        """End the query: no more answers come; for queries of ``queryable_kept``."""
         self._query.drop()  # type: ignore[no-untyped-call]
 
     def reply_error(self, text: str) -> None:
@@ -166,12 +166,12 @@ class ZenohBus:
         self._declared.append(self._session.declare_queryable(pattern, lambda q: handler(Query(q)), complete=True))
 
     def get(self, selector: str, timeout: float) -> list[QueryReply]:
-        """All answers to ``selector`` within ``timeout`` wall seconds.
+        """Return all answers to ``selector`` within ``timeout`` wall seconds.
 
         Raises
         ------
         MediumError
-            When the selector is no valid key expression.
+            When the selector is not a valid key expression.
         """
         try:
             replies = self._session.get(selector, timeout=timeout, consolidation=zenoh.ConsolidationMode.NONE)
@@ -216,7 +216,7 @@ known_thread = KnownThread()
 
 
 def stay_known() -> None:
-    """Have the interpreter keep what it knows of this foreign thread, from within its first callback on.
+    """Make the interpreter keep its state of this foreign thread, from within its first callback on.
 
     It makes a state for each callback of a thread that it did not start and drops it at the end: memory of the system's
     for the frames of its functions, taken and given back each time. One claim that is never given back keeps the state
@@ -228,7 +228,7 @@ def stay_known() -> None:
 
 
 def use_few_threads() -> None:
-    """Let the sessions of this process share one thread pool: for boards, and many processes on one machine.
+    """Share one thread pool among the sessions of this process: for boards, and many processes on one machine.
 
     Call it before the first session is opened; an existing environment setting wins.
     """
@@ -316,7 +316,7 @@ def end_declaration(declared: Any) -> None:
 
 
 def keys_intersect(selector_key: str, key: str) -> bool:
-    """Whether two key expressions have a key in common; False for what is no key expression."""
+    """Whether two key expressions have a key in common; False for an invalid key expression."""
     try:
         return bool(zenoh.KeyExpr(selector_key).intersects(zenoh.KeyExpr(key)))
     except zenoh.ZError:

@@ -47,7 +47,7 @@ class ZenohPort(QueuedPort):
         """Send a frame now, or as soon as the other end is there."""
         if len(self._queue) or self._closed or not self._publisher.is_heard:
             return super().send(frame)
-        payload = frame.payload  # as nearly always: nothing waits, and nothing has to
+        payload = frame.payload  # the usual case: nothing waits, and nothing has to
         if len(payload) > self._queue.largest:
             return super().send(frame)
         (self._answering if hearing.now else self._publisher).put(payload)
@@ -66,7 +66,7 @@ class ZenohPort(QueuedPort):
         self._subscription = self._bus.hear(self._receive_key, hear)
 
     def close(self) -> None:
-        """Let the end go."""
+        """Close this end."""
         if self._closed:
             return
         self._closed = True

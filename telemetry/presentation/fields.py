@@ -62,7 +62,7 @@ def codec_of(field: Field) -> FieldCodec:
 
 
 def quick(q: Quantity, kind: type[Any], check: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Check of a number that asks ``check`` only where it is not as nearly always: of its type and in its range."""
+    """Check of a number that calls ``check`` only for one of another type or out of its range."""
     low, high = q.low, q.high
 
     def checked(value: Any) -> Any:
@@ -215,7 +215,7 @@ def _stand(q: Quantity, item: Any) -> Stand:
 
 
 def _is_right(q: Quantity, stand: Stand) -> bool:
-    """Whether a stand is as the schema says without a conversion, as nearly always."""
+    """Whether a stand is as the schema says without a conversion: the usual case."""
     begun_at, ended_at, md = stand.begun_at, stand.ended_at, stand.md
     return (
         type(stand.epoch) is int

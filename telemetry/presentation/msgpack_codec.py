@@ -89,7 +89,7 @@ class MessageCodec:
 
 
 class UnwrittenMessage(Unwritten):
-    """A message as the values of all its fields, checked; its payload is made where somebody asks for the bytes."""
+    """A message as the values of all its fields, checked; its payload is made when its bytes are needed."""
 
     __slots__ = ("_opened", "codec", "values")
 

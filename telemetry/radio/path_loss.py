@@ -63,7 +63,7 @@ def received_power(loss: npt.ArrayLike, transmitted: npt.ArrayLike = TRANSMITTED
 
 
 def link_margin(power: npt.ArrayLike, threshold: npt.ArrayLike = THRESHOLD) -> Array:
-    """How far a received power (dBm) lies above the threshold, dB."""
+    """Margin of a received power (dBm) over the threshold, dB."""
     return np.asarray(np.asarray(power, float) - np.asarray(threshold, float))
 
 

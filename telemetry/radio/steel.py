@@ -85,6 +85,6 @@ def carbon_of(grade: str) -> float:
 
 
 def _place(knots: Array, values: Array) -> tuple[npt.NDArray[np.intp], Array]:
-    """Interval of every value and how far inside it lies, 0..1."""
+    """Interval index of every value among the knots, and its place inside, 0..1."""
     k = np.clip(np.searchsorted(knots, values, side="right") - 1, 0, len(knots) - 2)
     return k, np.asarray((values - knots[k]) / (knots[k + 1] - knots[k]))

@@ -45,7 +45,7 @@ class WaveguideMode:
     n: int
 
     def __post_init__(self) -> None:
-        """Refuse what is no mode."""
+        """Refuse an invalid mode."""
         if not (0 <= self.m <= HIGHEST and 1 <= self.n <= HIGHEST):
             raise RadioError(f"mode: expected m of 0..{HIGHEST} and n of 1..{HIGHEST}, got {self}")
 

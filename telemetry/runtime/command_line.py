@@ -51,7 +51,7 @@ class EnvironmentFault(click.ClickException):
 
 
 def fault_of(error: Exception) -> click.ClickException | None:
-    """Error as a line for its user; None for one that nobody expected."""
+    """Error as a line for its user; None for an unexpected one."""
     if isinstance(error, click.ClickException):
         return error
     if isinstance(error, InputError):
@@ -80,7 +80,7 @@ def plain_faults(command: Callable[P, R]) -> Callable[P, R]:
 
 
 def missing_module_text(module: str) -> str:
-    """What to install for a module that is not here."""
+    """Text on what to install for a missing module."""
     root = module.partition(".")[0]
     if root in PACKAGES:
         return f"needs the package {root} of borechain, which is not on this machine: pip install borechain"
@@ -122,7 +122,7 @@ def run_command(
 ) -> None:
     """Run a command under ``name`` and exit: 0 done, 1 the job could not be done here, 2 wrong arguments or input.
 
-    ``packages`` are those of ours that it needs; one of somebody else's in their place is refused by name.
+    ``packages`` are those of ours that it needs; a foreign one in their place is refused by name.
     """
     if (shadowed := foreign_package(packages)) is not None:
         sys.exit(f"{name}: {shadowed}")

@@ -2,7 +2,7 @@
 
 Saved state, count of starts, log of surveys, parameter blocks and database reach the disk through ``Disk`` alone, so
 that a simulated rig can have disks that tear, lose what was not forced, fill up or refuse. The calls are as small as
-what a cut of the power can come between: whoever wants something kept forces it, bytes and name.
+what a cut of the power can come between: a caller that must keep something forces it, bytes and name.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class Disk(Protocol):
         """Bytes of a file from ``offset`` on, fewer than ``size`` only at its end."""
 
     def reserve(self, path: Path, size: int) -> None:
-        """Make sure before anything is written over that a file, perhaps a new one, has room for ``size`` bytes."""
+        """Reserve room for ``size`` bytes of a file, perhaps a new one, before anything is written over."""
 
     def write(self, path: Path, data: bytes, offset: int = 0) -> None:
         """Write in place, into a new file where there is none; kept over a cut only once it is forced."""
@@ -34,7 +34,7 @@ class Disk(Protocol):
         """Force the names in a folder to the disk: a new file is not kept by forcing its bytes alone."""
 
     def rename(self, old: Path, new: Path) -> None:
-        """Give a file another name, in the place of what has it, in one step."""
+        """Rename a file in one step; a file of the new name is replaced."""
 
     def remove(self, path: Path) -> None:
         """Remove a file."""
@@ -82,7 +82,7 @@ class MachineDisk:
             os.close(descriptor)
 
     def force(self, path: Path) -> None:
-        """Force bytes, and have the cache forget them."""
+        """Force bytes, and make the cache forget them."""
         descriptor = os.open(path, os.O_RDWR)
         try:
             os.fsync(descriptor)

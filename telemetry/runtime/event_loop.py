@@ -24,7 +24,7 @@ def precise_loop() -> asyncio.AbstractEventLoop:
 
 
 def stop_on_signals(stop: Callable[[], None]) -> None:
-    """Have the running loop call ``stop`` on SIGTERM, and on Ctrl-C where no launcher sees to that."""
+    """Make the running loop call ``stop`` on SIGTERM, and on Ctrl-C without a launcher that handles it."""
     loop = asyncio.get_running_loop()
     loop.add_signal_handler(signal.SIGTERM, stop)
     if multiprocessing.parent_process() is None:

@@ -46,7 +46,7 @@ ZENOH = "zenoh:"
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a process finds its rig."""
+    """Address of a rig, for a process: its name, router, folder and keys."""
 
     rig: str
     endpoint: str
@@ -87,7 +87,7 @@ class Place:
 class OwnTime:
     """Settings of a process with a clock of its own: its neighbours and its clock's offset."""
 
-    neighbours: Mapping[Side, int | None]  # address of the process at each end that is joined, None: whoever is there
+    neighbours: Mapping[Side, int | None]  # address of the process at each joined end, None: found by the medium
     offset: float = 0.0  # s, of its clock against the machine's
 
 
@@ -198,7 +198,7 @@ def write_timing(folder: Path, report: dict[str, Any]) -> None:
 
 
 def warn_of_keys(name: str, seals: Seals | None) -> None:
-    """Say what is odd about the keys of a process; it goes on."""
+    """Write the warnings on the keys of a process; it goes on."""
     for line in () if seals is None else seals.ring.warnings:
         write_warning(name, line)
 
@@ -221,7 +221,7 @@ def begin_process(name: str) -> None:
 
 
 def end_after_parent() -> None:
-    """Wait until the launcher is gone, then end this process: asked first, and for good where it does not.
+    """Wait until the launcher has ended, then end this process: by SIGTERM first, for good if that does not do it.
 
     The kernel's signal at a parent's death is that of the fork server, which may outlive the launcher.
     """

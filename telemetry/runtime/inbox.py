@@ -42,7 +42,7 @@ class Mailbox(Generic[T]):
         return self._closed
 
     def put(self, item: T) -> bool:
-        """Put an item in, from any thread; never waits, and returns False for one that finds the box full."""
+        """Put an item in, from any thread, without waiting; returns False if the box is full."""
         with self._lock:
             if len(self._items) >= self._limit:
                 self.dropped += 1
@@ -52,7 +52,7 @@ class Mailbox(Generic[T]):
         return True
 
     def close(self) -> None:
-        """Forget what waits and take nothing more, from any thread or signal handler of the loop."""
+        """Drop what waits and take nothing more, from any thread or signal handler of the loop."""
         self._closed = True
         self.wake()
 
@@ -61,7 +61,7 @@ class Mailbox(Generic[T]):
         return self._items.popleft() if self._items and not self._closed else None
 
     def wake(self) -> None:
-        """Have ``arrived`` called, from any thread."""
+        """Make the loop call ``arrived``, from any thread."""
         if self._wake_is_due:
             return
         self._wake_is_due = True

@@ -28,23 +28,23 @@ class JointFault(NamedTuple):
 
     @property
     def arguments(self) -> dict[str, Scalar]:
-        """Of the event ``joint_fault``."""
+        """Arguments of the event ``joint_fault``."""
         return {"side": self.side.name.lower(), "fault": self.fault, "count": self.times}
 
     @property
     def line(self) -> str:
-        """For people."""
+        """Line for people."""
         return f"{self.side.name.lower()} end: {self.fault} ({self.times}): {FAULTS[self.fault]}"
 
 
 class JointWatch:
-    """Compares the counts of ports with what was told."""
+    """Compares the counts of ports with those last reported."""
 
     def __init__(self) -> None:
         self._told: dict[tuple[Side, str], tuple[int, float]] = {}  # count and time
 
     def find(self, ports: Mapping[Side, Port], now: float) -> list[JointFault]:
-        """Faults that are new, or have grown and were told longer than a minute ago."""
+        """Faults that are new, or have grown and were reported longer than a minute ago."""
         found = []
         for side, port in ports.items():
             for fault in FAULTS:

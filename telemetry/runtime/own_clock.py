@@ -56,7 +56,7 @@ class Schedule:
 
     @property
     def halfway(self) -> float:
-        """The middle of the time before it."""
+        """Middle of the period before the deadline."""
         return self.due - 0.5 * self._period
 
     def finish(self, now: float) -> int:
@@ -68,7 +68,7 @@ class Schedule:
 
 
 class AbsenceWatch:
-    """Finds the ends at which nobody has been heard for ``limit`` s, and names each once until somebody is."""
+    """Finds the ends without a neighbour heard for ``limit`` s, and names each once until one is heard."""
 
     def __init__(self, sides: Iterable[Side], begin: float, limit: float = ABSENT_LIMIT) -> None:
         self._limit = limit
@@ -76,7 +76,7 @@ class AbsenceWatch:
         self._reported: set[Side] = set()
 
     def find(self, neighbours: Mapping[Side, object], now: float) -> list[Side]:
-        """Ends that are newly found silent; ``neighbours`` holds None where nobody is heard."""
+        """Ends that are newly found silent; ``neighbours`` holds None where none is heard."""
         found = []
         for side, heard_at in self._heard_at.items():
             if neighbours.get(side) is not None:
@@ -101,7 +101,7 @@ class OwnClockLoop:
     ports : its ends that have a neighbour
     clock, timing : its clock, and where the durations are kept
     period : s, of a cycle
-    report : takes a line about an end at which nobody is heard
+    report : takes a line about an end at which no neighbour is heard
     at_once : frames may be handled on the threads that hear them: nothing but this loop calls the process
     """
 
@@ -117,7 +117,7 @@ class OwnClockLoop:
         at_once: bool = False,
     ) -> None:
         self._at_once, self._thread = at_once, threading.get_ident()
-        self._calling = threading.Lock()  # held by whoever calls the process
+        self._calling = threading.Lock()  # held during a call of the process
         self._process, self._ports, self._clock, self._timing = process, ports, clock, timing
         self._report = report
         self._asyncio = asyncio.get_running_loop()
@@ -136,7 +136,7 @@ class OwnClockLoop:
             port.listen(partial(self._on_frame, side))
 
     def call(self, act: Act) -> None:
-        """Have ``act(process, now)`` called; from any thread."""
+        """Call ``act(process, now)`` on the loop; from any thread."""
         self._inbox.put(act)
 
     def stop(self) -> None:
@@ -169,7 +169,7 @@ class OwnClockLoop:
         return {"inbox_dropped": self._inbox.dropped, "ports": ports}
 
     def _on_arrival(self) -> None:
-        """Something has arrived, or is due."""
+        """Handle an arrival or a due timer."""
         if self._ended is None or self._ended.done():
             return
         try:
@@ -191,7 +191,7 @@ class OwnClockLoop:
         self._on_arrival()
 
     def _turn(self) -> None:
-        """Do what waits and what is due, and come again: at once for what still waits, else when more is due."""
+        """Handle what waits and what is due; run again at once for the rest, else when more is due."""
         self._take_waiting()
         self._do_due()
         if len(self._inbox):
@@ -202,7 +202,7 @@ class OwnClockLoop:
             self._set_timer(wake_at)
 
     def _set_timer(self, due: float) -> None:
-        """Have ``_on_timer`` called at ``due`` (s, own clock) and no earlier moment, or never."""
+        """Set the one timer of ``_on_timer`` to ``due`` (s, own clock); infinite: none."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -216,7 +216,7 @@ class OwnClockLoop:
         return schedule.due if self._synchronised >= schedule.due else schedule.halfway
 
     def _take_waiting(self) -> None:
-        """Frames and calls that wait, until something else is due; where there are none, the timer that is due."""
+        """Handle waiting frames and calls until something else is due; without any, the timer that is due."""
         act = self._inbox.take()
         now = self._clock.now()
         if act is None and now < self._next_moment():
@@ -232,7 +232,7 @@ class OwnClockLoop:
             act = self._inbox.take()
 
     def _do_due(self) -> None:
-        """The cycle or the synchronisation that is due, or else send what the frames so far have made."""
+        """Run the cycle or the synchronisation that is due; else send what the frames so far have made."""
         now = self._clock.now()
         if now >= self._schedule.due:
             self._read_until = run_cycle(
@@ -258,7 +258,7 @@ class OwnClockLoop:
         for side in self._absence.find(self._process.endpoint.place.neighbours, now):
             state = "up" if self._ports[side].is_up else "down"
             self._report(
-                f"{side.name.lower()} end: nobody heard for {ABSENT_LIMIT:.0f} s, the port is {state}; "
+                f"{side.name.lower()} end: no neighbour heard for {ABSENT_LIMIT:.0f} s, the port is {state}; "
                 "does the neighbour run, and is it the right one?"
             )
 
@@ -304,7 +304,7 @@ def run_cycle(
     clock: OwnClock,
     timing: CycleTiming,
 ) -> float:
-    """The cycle that is due, over the readings since ``begin`` (s); returns their end, where the next one begins."""
+    """Run the due cycle over the readings since ``begin`` (s); returns their end (s), the next one's begin."""
     end = clock.now()
     timing.add_duration(CycleStage.START, end - schedule.due)
     timing.begin()
@@ -321,7 +321,7 @@ def run_cycle(
 
 
 def send_due_frames(process: Process, ports: Mapping[Side, Port], now: float) -> None:
-    """Put on the wire what is due; an end without a neighbour sends nothing."""
+    """Send the frames that are due; an end without a neighbour sends nothing."""
     for side, frame in process.take_frames(now):
         if side in ports:
             ports[side].send(frame)

@@ -11,7 +11,7 @@ MARK = '__distribution__ = "borechain"'
 
 
 def foreign_package(names: Iterable[str] = PACKAGES) -> str | None:
-    """What to say of the first of ``names`` that is somebody else's; None when all that are installed are ours.
+    """Error line on the first of ``names`` that is a foreign package; None when all that are installed are ours.
 
     Nothing foreign is imported for it: the source of each package is read. A folder without an ``__init__.py`` is no
     package that could stand in the way of one.

@@ -1,4 +1,4 @@
-"""The interface of a process: everything it does when events come, whoever drives it."""
+"""The interface of a process: everything it does when events come, with any driver."""
 
 from __future__ import annotations
 
@@ -22,30 +22,30 @@ class Process:
     endpoint: Endpoint
 
     def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
-        """A frame arrived at one end; the messages for this process are for a subclass to take.
+        """Handle a frame that arrived at one end; a subclass takes the messages for this process.
 
         A radio tells the ``margin`` (dB) over its threshold with which it was heard.
         """
         self.endpoint.receive(side, frame, now, margin)
 
     def on_cycle(self, data: Any, now: float) -> None:
-        """A cycle has ended with the sample ``data``; a process without a sensor ignores it."""
+        """Handle the end of a cycle with the sample ``data``; a process without a sensor ignores it."""
 
     def on_overrun(self, missed: int, now: float) -> None:
-        """A cycle ended at ``now`` when ``missed`` later ones should have begun; only an own clock reports it."""
+        """Handle a cycle that ended at ``now`` (s) when ``missed`` later ones should have begun; own clock only."""
 
     def on_joint_fault(self, fault: JointFault, now: float) -> None:
-        """Something went wrong at a joint, see ``joint_watch``; only an own clock reports it."""
+        """Handle a fault of a joint, see ``joint_watch``; own clock only."""
 
     def on_depth(self, payload: bytes, now: float) -> None:
-        """The rig sent a reading of the depth of the bit, or somebody sent other bytes; most processes hear none."""
+        """Handle bytes from the source of the depth, a reading or anything else; most processes hear none."""
 
     def on_timer(self, now: float) -> None:
-        """A timer named by ``next_wake`` is due: hello, time requests, repetition."""
+        """Handle a timer named by ``next_wake``: hello, time requests, repetition."""
         self.endpoint.advance(now)
 
     def before_frames(self) -> None:
-        """Frames are about to be taken: what must be on a disk before they leave is to be put there."""
+        """Prepare for frames to be taken: put on the disk what must be there before they leave."""
 
     def take_frames(self, now: float) -> list[tuple[Side, PortFrame]]:
         """Frames to send now."""
@@ -57,4 +57,4 @@ class Process:
         return self.endpoint.next_wake(now)
 
     def close(self) -> None:
-        """The process ends as it was asked to: let sensors go, keep what is worth keeping."""
+        """End in good order: release sensors, save what is worth keeping."""

@@ -24,7 +24,7 @@ INSECURE = "borechain.insecure"  # in the context of a command
 
 
 def read_config(context: click.Context, _parameter: click.Parameter, path: Path | None) -> None:
-    """Take the options of a command from a TOML file; what stands on the command line wins."""
+    """Read the options of a command from a TOML file; those on the command line win."""
     if path is None:
         return
     try:
@@ -42,7 +42,7 @@ def read_config(context: click.Context, _parameter: click.Parameter, path: Path 
 
 
 def remember_insecure(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
-    """Let ``parse_endpoint`` know."""
+    """Store the option's value for ``parse_endpoint``."""
     context.meta[INSECURE] = value
 
 
@@ -57,7 +57,7 @@ insecure_option = click.option(
 
 
 def parse_endpoint(context: click.Context, _parameter: click.Parameter, value: str) -> str:
-    """An address as zenoh writes it, of this machine or with TLS unless the user wants it otherwise."""
+    """Return an endpoint in zenoh's form: on this machine or with TLS, unless ``--insecure`` is given."""
     protocol, _, place = value.partition("/")
     host, _, port = place.rpartition(":")
     if not (protocol.isalpha() and host and port.isdecimal()):
@@ -67,7 +67,7 @@ def parse_endpoint(context: click.Context, _parameter: click.Parameter, value: s
 
 
 def secure_endpoint(context: click.Context, _parameter: click.Parameter, value: str) -> str:
-    """An address that is looked at more closely before it is used."""
+    """Return an endpoint after a closer check than ``parse_endpoint``."""
     check_secure(context, value)
     return value
 
@@ -87,7 +87,7 @@ def check_secure(context: click.Context, endpoint: str) -> None:
 
 
 def endpoint_option(text: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Option ``--endpoint``; ``text`` says what is there."""
+    """Option ``--endpoint``; ``text`` says what listens there."""
     return click.option(
         "--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, callback=parse_endpoint, help=text
     )
@@ -182,7 +182,7 @@ below_option = click.option(
 
 
 def parse_medium(context: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:
-    """Medium of an end, looked at before anything is opened."""
+    """Return the medium of an end, checked before anything is opened."""
     if value is not None:
         try:
             check_medium(value)
@@ -206,10 +206,10 @@ def own_neighbours(
     ends: dict[Side, int | None],
     media: dict[Side, str | None],
 ) -> dict[Side, int | None] | None:
-    """Who is at the ends of a process with a clock of its own; None where a stepper drives it.
+    """Neighbours at the ends of a process with a clock of its own; None where a stepper drives it.
 
-    ``sensor`` is the option that names it and what was given. An end on CAN needs no neighbour by name: whoever is at
-    the other end of the segment is it, and is None here.
+    ``sensor`` is the option that names it and what was given. An end on CAN needs no neighbour by name: it is
+    what answers at the other end of the segment, and None here.
 
     Raises
     ------

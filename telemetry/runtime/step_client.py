@@ -48,7 +48,7 @@ class StepAssembler:
         return self._step is not None or bool(self._waiting[STEP])
 
     def add(self, channel: int, payload: bytes) -> None:
-        """Take what arrived on a channel."""
+        """Add what arrived on a channel."""
         self._waiting[channel].append(payload)
 
     def take_step(self) -> Step | None:
@@ -66,7 +66,7 @@ class StepAssembler:
 
 
 class StepEnd:
-    """What both clients are: ports, steps in, answers out, token of life.
+    """Common part of both clients: ports, steps in, answers out, token of life.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class StepEnd:
         bus.liveliness_token(keys.LIVELINESS.format(rig=rig, process=name))
 
     def run(self, process: Process, step: Step) -> None:
-        """Have ``process`` do a step and answer it."""
+        """Run a step of ``process`` and send its answer."""
         number, events = step
         sent: list[Sent] = []
 
@@ -151,7 +151,7 @@ class StepClient(StepEnd):
                 if received is not None:
                     self.assembler.add(STEP, received)
                     continue
-                timeout = None  # the stepper is gone: whoever started this process ends it
+                timeout = None  # the stepper is gone: the launcher ends this process
             try:
                 channel, payload = self._arrived.get(timeout=timeout)
             except queue.Empty:
@@ -183,7 +183,7 @@ class AsyncStepClient(StepEnd):
         self.inbox.close()
 
     def leave(self) -> None:
-        """Read nothing more."""
+        """Stop reading."""
         if self._stream is not None:
             asyncio.get_running_loop().remove_reader(self._stream)
 

@@ -18,8 +18,8 @@ from telemetry.errors import MediumError
 
 LENGTH = struct.Struct(">I")
 CHUNK = 1 << 16
-LARGEST = 1 << 26  # bytes; whoever announces more is no process of ours
-NAME_LIMIT = 10.0  # wall s that one who connects may take to say who it is
+LARGEST = 1 << 26  # bytes; a peer that announces more is not a process of ours
+NAME_LIMIT = 10.0  # wall s within which a connecting process must say which it is
 
 
 class StepStream:
@@ -31,7 +31,7 @@ class StepStream:
         self._complete: deque[bytes] = deque()
 
     def fileno(self) -> int:
-        """For those who wait for several."""
+        """File descriptor, to wait for several at once."""
         return self._socket.fileno()
 
     def send(self, payload: bytes) -> None:
@@ -54,19 +54,19 @@ class StepStream:
         return self._complete.popleft()
 
     def arrived(self) -> list[bytes] | None:
-        """Payloads that have come, for one who knows that there is something to read; None when the end is gone."""
+        """Payloads that have come, for a caller that knows there is something to read; None when the end is gone."""
         alive = self._read()
         found = list(self._complete)
         self._complete.clear()
         return found if found or alive else None
 
     def shut(self) -> None:
-        """End it: whoever waits in ``receive`` gets None; may be called from a signal handler."""
+        """End it: a thread that waits in ``receive`` gets None; may be called from a signal handler."""
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
 
     def close(self) -> None:
-        """Let the connection go."""
+        """Close the connection."""
         self._socket.close()
 
     def _read(self) -> bool:
@@ -94,7 +94,7 @@ def join_steps(place: Path, name: str) -> StepStream:
     Raises
     ------
     MediumError
-        When nobody listens there.
+        When there is no listener.
     """
     connected = socket.socket(socket.AF_UNIX)
     try:
@@ -138,14 +138,14 @@ class StepListener:
             self._waker.send(b"\0")
 
     def wait(self, timeout: float) -> bool:
-        """Take what comes within ``timeout`` wall seconds; False when nothing did."""
+        """Handle what comes within ``timeout`` wall seconds; False if nothing did."""
         ready = self._selector.select(max(timeout, 0.0))
         for key, _ in ready:
             key.data()
         return bool(ready)
 
     def close(self) -> None:
-        """Let every connection go."""
+        """Close every connection."""
         self._selector.close()
         for stream in self._streams.values():
             stream.close()

@@ -18,7 +18,7 @@ BIN_RATIO = 10.0 ** (1.0 / BINS_A_DECADE)
 
 
 class CycleStage(enum.Enum):
-    """What is measured; behind it the number of the execution cycle's event (node specification section 1)."""
+    """Stages that are measured, each with the number of the execution cycle's event (node specification section 1)."""
 
     SYNCHRONISE = "synchronise"  # 1: neighbours, hello, time request
     START = "start"  # 2: how late the cycle starts behind its deadline
@@ -42,7 +42,7 @@ class Durations:
         self._bins = [0] * (BINS_A_DECADE * DECADES)
 
     def add(self, seconds: float) -> None:
-        """Take one."""
+        """Count one duration (s)."""
         seconds = max(seconds, 0.0)
         self.count += 1
         self._total += seconds
@@ -93,13 +93,13 @@ class CycleTiming:
         self._mark = time.perf_counter()
 
     def lap(self, stage: CycleStage) -> None:
-        """Give ``stage`` the time since the last ``begin`` or ``lap``."""
+        """Count the time since the last ``begin`` or ``lap`` for ``stage``."""
         now = time.perf_counter()
         self.stages[stage].add(now - self._mark)
         self._mark = now
 
     def add_duration(self, stage: CycleStage, seconds: float) -> None:
-        """Give ``stage`` a duration that was measured elsewhere."""
+        """Count a duration (s) that was measured elsewhere for ``stage``."""
         self.stages[stage].add(seconds)
 
     def end_cycle(self, seconds: float, missed: int, now: float) -> None:
@@ -112,7 +112,7 @@ class CycleTiming:
             self.first_cycle_at = now
 
     def report(self) -> dict[str, Any]:
-        """Everything, for a file."""
+        """Everything, as JSON for a file."""
         return {
             "cycles": self.cycles,
             "overruns": self.overruns,

@@ -29,12 +29,12 @@ def sealed_segment(segment: BlockSegment, key: bytes) -> BlockSegment:
 
 
 def is_authentic(segment: BlockSegment, key: bytes) -> bool:
-    """Whether the tag was made with ``key``, judged in a time that tells nothing of it."""
+    """Return whether the tag was made with ``key``, compared in constant time."""
     return hmac.compare_digest(segment.tag, _tag(segment, key))
 
 
 def read_key(path: Path) -> bytes:
-    """Key of a rig: 64 hex digits in a file that nobody but its owner may read.
+    """Key of a rig: 64 hex digits in a file that only its owner may read.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """One joint's link as a pure state machine: frames in, payloads out, acknowledgement and retransmission.
 
 A frame is ``crc32 | msgpack [version, sender, epoch, count, ack_epoch, ack, ack_mask, entries]``; an entry is
-``[number, payload]``, number 0 for what may be lost. ``epoch`` names the sender, its boot and session; whoever sees a
-new one starts to count from 1 again, and takes numbered payloads only from a sender that knows whom it talks to.
+``[number, payload]``, number 0 for what may be lost. ``epoch`` names the sender, its boot and session; on a new one
+the other end starts to count from 1 again, and takes numbered payloads only from a sender that knows whom it talks to.
 Acknowledgement is cumulative plus a mask of the next 64 numbers and rides on whatever frame leaves next. Nothing that
 arrives raises, and every queue is bounded.
 """
@@ -51,7 +51,7 @@ class Outstanding:
 
 
 class Patient(NamedTuple):
-    """Best effort that waits for others to go with, until a time (s)."""
+    """A best-effort payload that waits for others to go with, until a time (s)."""
 
     payload: Content
     priority: Priority
@@ -68,7 +68,7 @@ class Entry(NamedTuple):
 
 
 class Header(NamedTuple):
-    """What every frame begins with."""
+    """First part of every frame."""
 
     sender: int
     epoch: int
@@ -164,7 +164,7 @@ class HopLink:
         self._patient_until = min(self._patient_until, until)
 
     def release(self, now: float = math.inf) -> None:
-        """Send what waited for others to go with, or what has waited until ``now`` (s)."""
+        """Make the payloads due that wait for others to go with, or that have waited until ``now`` (s)."""
         if not self._patient:
             return
         before, self._patient, self._patient_until = self._patient, {}, math.inf
@@ -176,7 +176,7 @@ class HopLink:
                 self._patient_until = min(self._patient_until, waiting.until)
 
     def receive(self, frame: Content, now: float, margin: float = math.inf) -> list[Content]:
-        """Payloads of a frame that were not delivered before; garbage is counted and gives none.
+        """Return the payloads of a frame that were not delivered before; garbage is counted and gives none.
 
         ``margin`` is what the radio heard it with over its threshold, dB.
         """
@@ -208,7 +208,7 @@ class HopLink:
         if self._patient_until <= now:
             self.release(now)
         if not (self._best_effort or self._queue or self._outstanding or self._ack_due <= now):
-            return frames  # as nearly always: it is asked after every event
+            return frames  # the usual case: called after every event
         entries = self._due_entries(now)
         while len(entries) > 1:
             count = bundled_count(entries, self.bundle_limit)
@@ -219,7 +219,7 @@ class HopLink:
         return frames
 
     def next_wake(self, now: float) -> float:
-        """When ``take_frames`` has something to do without further input, infinite if never."""
+        """Time (s) at which ``take_frames`` has something to do without further input, infinite if never."""
         wake = self._ack_due if self._ack_due < self._patient_until else self._patient_until
         if self._outstanding and self.is_up(now):
             wake = min(wake, *(one.send_at for one in self._outstanding.values()))
@@ -231,7 +231,7 @@ class HopLink:
         return len(self._queue) + len(self._outstanding)
 
     def _is_me(self, epoch: int) -> bool:
-        """Whether the other end means this process and not the one before a restart, whose numbers it still uses."""
+        """Return whether an epoch names this process, not the one before a restart, whose numbers may still come."""
         return epoch >> BOOT_SHIFT == self._boot_count and epoch & 0xFF == self._address
 
     def _is_of_before(self, epoch: int) -> bool:
@@ -247,7 +247,7 @@ class HopLink:
     def _on_peer(self, sender: int, epoch: int) -> None:
         """Notice another process at the other end (start our numbers anew) or its new session (forget its numbers)."""
         if epoch == self._peer_epoch and self.peer is not None and sender == self.peer[0]:
-            return  # as nearly always
+            return  # the usual case
         peer = (sender, epoch >> BOOT_SHIFT)
         if peer != self.peer:
             if self.peer is not None:
@@ -319,7 +319,7 @@ class HopLink:
         self.counters["frames_sent"] += 1
         peer_epoch = max(self._peer_epoch, 0)
         header = Header(self._address, self.epoch, self._frames, peer_epoch, self._received, self._received_mask)
-        if len(entries) == 1:  # as nearly always
+        if len(entries) == 1:  # the usual case
             number, payload, priority, topic = entries[0]
             return PortFrame(LinkFrame(header, [(number, payload)]), priority, None if topic is None else (topic,))
         priority = min([entry.priority for entry in entries], default=Priority.COMMAND)
@@ -338,7 +338,7 @@ def pack_frame(header: Sequence[int], entries: Sequence[Sequence[object]]) -> by
 
 
 def most_of(payload: Content) -> int:
-    """Bytes that a payload takes at most."""
+    """Largest size (bytes) of a payload."""
     return payload.most if isinstance(payload, Unwritten) else len(payload)
 
 
@@ -363,7 +363,7 @@ def parse_frame(frame: Content) -> tuple[Header, Sequence[Any]] | None:
 
 
 def common_topic(entries: Iterable[Entry]) -> Hashable | None:
-    """Topic of a frame with these entries: theirs together where all are best effort, None where one is numbered."""
+    """Topic of a frame of these entries: all their topics if all are best effort, None if one is numbered."""
     topics = tuple([entry.topic for entry in entries])
     if not topics:
         return ACKNOWLEDGEMENT
@@ -371,7 +371,7 @@ def common_topic(entries: Iterable[Entry]) -> Hashable | None:
 
 
 def bundled_count(entries: Iterable[Entry], limit: int) -> int:
-    """How many of the first entries share a frame: at most ``limit`` bytes of them, but one in any case."""
+    """Number of the first entries that share a frame: ``limit`` bytes of them at most, but at least one."""
     count = total = 0
     for entry in entries:
         total += len(bytes(entry.payload)) + ENTRY_BYTES

@@ -4,7 +4,7 @@ A sealed frame names its sender and its addressee, the random session number of 
 believed when its tag fits and it names the receiver's present session, which proves that it was made after this end
 began; within a session a window of 64 numbers lets each frame in once. Nothing has to be kept over a restart for that.
 
-Who is at the other end is not known before: an end that hears nobody calls, under a key of the whole rig, and a call
+The process at the other end is not known before: an end that hears none calls, under a key of the whole rig. A call
 proves nothing. It is answered with a sealed frame that names the caller's session; the caller's next frame then names
 this end's, and both are proven.
 """
@@ -27,10 +27,10 @@ ANYBODY = 255  # addressee of a call
 LAST_NUMBER = 2**32 - 1
 CALL_EVERY = 1.0  # s
 UNHEARD = 1.5  # s without a frame of the other end, after which this end calls
-ANSWER_EVERY = 0.1  # s, so that calls that somebody repeats cost little
+ANSWER_EVERY = 0.1  # s, so that repeated calls cost little
 PROOF_WITHIN = 3.0  # s that an end has to prove a session it claims, until what it sealed counts as repeated
 DUPLICATE_WITHIN = 0.5  # s after a frame, in which a second one is the medium's doing
-SETTLED = 5.0  # s after which frames for somebody else are no longer those of a joint that was just closed
+SETTLED = 5.0  # s after which frames for another process are no longer those of a joint that was just closed
 
 Ring = Callable[[], KeyRing]
 Lot = Callable[[], int]
@@ -51,7 +51,7 @@ class Partner:
 
 @dataclass(slots=True)
 class Claim:
-    """A session that somebody claims and has not proven; ``frames`` were sealed for it and are of no effect."""
+    """A session that a sender claims and has not proven; ``frames`` were sealed for it and are of no effect."""
 
     address: int
     session: int
@@ -87,7 +87,7 @@ class JointSeal:
         self._answered_at = self._called_at = -math.inf
 
     def open(self, frame: bytes, now: float) -> bytes | None:
-        """What a frame that came at ``now`` (s) carries; None where it is of no effect."""
+        """Return the content of a frame that came at ``now`` (s); None where it takes no effect."""
         if len(frame) < OVERHEAD or frame[0] != VERSION:
             self._refuse("unsealed")
             return None
@@ -105,12 +105,12 @@ class JointSeal:
         return self._deliver(sender, session, newest, number, frame[HEAD.size : -TAG_SIZE], now)
 
     def close(self, payload: bytes) -> bytes | None:
-        """Frame for the other end; None where nobody has proven to be there."""
+        """Sealed frame for the other end; None without a proven session."""
         partner = self.partner
         return None if partner is None else self._sealed(partner.address, partner.session, partner.newest, payload)
 
     def own_frames(self, now: float) -> list[bytes]:
-        """Call, answer and first word to a new partner that are due at ``now`` (s)."""
+        """Return the call, the answer and the first frame to a new partner that are due at ``now`` (s)."""
         frames: list[bytes | None] = []
         claim = self._claim
         if self._answer_due and claim is not None and now >= self._answered_at + ANSWER_EVERY:
@@ -128,11 +128,11 @@ class JointSeal:
         return [frame for frame in frames if frame is not None]
 
     def next_wake(self) -> float:
-        """When an answer is due (s), infinite if none."""
+        """Time (s) at which an answer is due, infinite if none."""
         return self._answered_at + ANSWER_EVERY if self._answer_due else math.inf
 
     def forget_revoked(self) -> None:
-        """Let go of a partner whose key is no longer believed."""
+        """Drop a partner whose key is no longer believed."""
         if self.partner is not None and self.partner.address in self._ring().revoked:
             self.partner = None
         if self._claim is not None and self._claim.address in self._ring().revoked:
@@ -155,7 +155,7 @@ class JointSeal:
         return payload or None
 
     def _on_claim(self, sender: int, session: int, newest: int, now: float, *, is_call: bool) -> None:
-        """Somebody who does not know this end's session: let him know it, and see whether he can use it."""
+        """Handle a sender that does not know this end's session: send it, and see whether the sender can use it."""
         partner, claim = self.partner, self._claim
         if partner is not None and not is_call and (partner.address, partner.session) == (sender, session):
             self._refuse("late" if now < partner.since + SETTLED else "old_session")  # he knows this end's session
@@ -185,7 +185,7 @@ class JointSeal:
         return body + key.tag(body)
 
     def _call(self) -> bytes | None:
-        """Under the oldest keys, which the other end has if it has any."""
+        """Call under the oldest keys, which the other end has if it has any."""
         return self._sealed(ANYBODY, 0, self._ring().oldest, b"")
 
     def _key(self, generation: int, sender: int, addressee: int) -> SealKey | None:

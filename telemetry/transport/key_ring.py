@@ -7,7 +7,7 @@ key          seals                                       held by
 ===========  ==========================================  ===================================
 end          messages between a tube and the base        that tube (or the encoder), the base
 joint        frames between two processes                these two
-call         calls for whoever is at the other end       everybody
+call         calls for the process at the other end      everybody
 measurement  the encoder's measurement                   everybody on the string
 depth        readings of the depth                       the source of the depth, the base
 block        segments of a parameter block               the tube, the base
@@ -89,7 +89,7 @@ class KeyRing:
 
     @property
     def oldest(self) -> int:
-        """Number of the oldest generation, which everybody has who was given keys since it was made."""
+        """Number of the oldest generation, which every process has that was given keys since it was made."""
         return self.generations[0].number
 
     def common(self, others_newest: int) -> int:
@@ -144,7 +144,7 @@ def key_file(place: Path, address: int) -> Path:
 def pack_ring(ring: KeyRing) -> str:
     """Text of a key file."""
     lines = [
-        f"# keys of {file_name(ring.address)} of the rig {ring.rig}; whoever has them speaks for it",
+        f"# keys of {file_name(ring.address)} of the rig {ring.rig}; a holder of this file can speak for it",
         f"format = {FORMAT}",
         f'rig = "{ring.rig}"',
         f"address = {ring.address}",
@@ -159,7 +159,7 @@ def pack_ring(ring: KeyRing) -> str:
 
 
 def read_ring(path: Path, address: int, now: datetime.datetime | None = None) -> KeyRing:
-    """Keys of the process ``address`` from their file; what is odd about it at ``now`` (UTC) is a warning.
+    """Keys of the process ``address`` from their file; oddities of its dates at ``now`` (UTC) become warnings.
 
     Raises
     ------
@@ -180,12 +180,12 @@ def read_ring(path: Path, address: int, now: datetime.datetime | None = None) ->
 
 
 def read_private(path: Path) -> str:
-    """Text of a file that nobody but its owner may read.
+    """Return the text of a file that only its owner may read.
 
     Raises
     ------
     KeyFileError
-        When it cannot be read, is no text or is open to others.
+        When it cannot be read, is not text or is open to others.
     """
     try:
         with path.open(encoding="ascii") as file:
@@ -228,7 +228,7 @@ def _generation_of(row: dict[str, Any]) -> Generation:
 
 
 def _warned(ring: KeyRing, path: Path, now: datetime.datetime) -> KeyRing:
-    """The ring with what is odd about it; a board without a clock drills all the same."""
+    """Return the ring with warnings on its dates; a board without a clock drills all the same."""
     warnings = []
     for g in ring.generations:
         if g.made_at > now + AHEAD_WARNED:

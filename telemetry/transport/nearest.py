@@ -23,7 +23,7 @@ class Nearest:
         self._since = math.inf
 
     def is_chosen(self, sender: int, now: float) -> bool:
-        """Whether a frame of ``sender`` that arrived at ``now`` (s, own clock) is to be listened to."""
+        """Return whether to listen to a frame of ``sender`` that arrived at ``now`` (s, own clock)."""
         self._heard = {who: at for who, at in self._heard.items() if now - at <= SILENT_AFTER}
         if math.isinf(self._distance(sender)):
             return False

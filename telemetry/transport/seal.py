@@ -18,7 +18,7 @@ ALL_SEEN = (1 << WINDOW) - 1  # bits of a window
 
 
 class SealKey:
-    """A key for tags; its schedule is worked out once and copied for each tag."""
+    """A key for tags; its schedule is computed once and copied for each tag."""
 
     def __init__(self, key: bytes) -> None:
         self._context = CMAC(AES(key))
@@ -30,7 +30,7 @@ class SealKey:
         return context.finalize()[:TAG_SIZE]
 
     def fits(self, tag: bytes, *parts: bytes) -> bool:
-        """Whether a tag is that of the parts, judged in a time that tells nothing of the right one."""
+        """Return whether a tag is that of the parts, compared in constant time."""
         return hmac.compare_digest(tag, self.tag(*parts))
 
 
@@ -42,7 +42,7 @@ class ReplayWindow:
         self._seen = 0  # bit k: the number k below the largest came
 
     def admit(self, number: int) -> bool:
-        """Whether a number (>= 0) comes for the first time; it counts as come from then on."""
+        """Return whether a number (>= 0) comes for the first time, and note it."""
         ahead = number - self._largest
         if ahead > 0:
             self._seen = (self._seen << ahead | 1) & ALL_SEEN if ahead < WINDOW else 1

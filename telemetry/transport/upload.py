@@ -33,7 +33,7 @@ def split_block(block: bytes, tube: int, sequence: int, version: int, key: bytes
 
 
 class Upload:
-    """The sender: says all segments once, then those that the node lacks, until the node has judged the block."""
+    """The sender: sends all segments once, then those that the node lacks, until the node has judged the block."""
 
     def __init__(self, segments: tuple[BlockSegment, ...], now: float) -> None:
         self.segments = segments
@@ -43,7 +43,7 @@ class Upload:
         self._untrusted = 0
 
     def due_segments(self, now: float) -> list[BlockSegment]:
-        """Segments to send now; when none is missing the first one, whose answer tells how it stands."""
+        """Segments to send now; if none is missing the first one, whose answer tells the state."""
         if now < self.next_due:
             return []
         self.next_due = now + self._wait
@@ -52,7 +52,7 @@ class Upload:
         return missing or [self.segments[0]]
 
     def on_status(self, status: BlockStatus) -> bool:
-        """Take the node's account; True when it is its last word on this block."""
+        """Take the node's account of an upload; returns whether it is the last one on this block."""
         first = self.segments[0]
         if (status.tube, status.sequence, status.digest) != (first.tube, first.sequence, first.digest):
             return False
@@ -94,17 +94,17 @@ class Assembly:
         return len(self._parts) == self.count
 
     def block(self) -> bytes | None:
-        """Bytes of a complete block; None when they are not what the hash is of."""
+        """Bytes of a complete block; None if they do not fit the hash."""
         data = b"".join(self._parts[index] for index in range(self.count))
         return data if hashlib.sha256(data).digest() == self.digest else None
 
     def export(self) -> bytes:
-        """What must survive a restart."""
+        """Pack what a restart needs."""
         return bytes(msgpack.packb([self.version, self.digest, self.count, sorted(self._parts.items())]))
 
     @classmethod
     def restore(cls, saved: bytes) -> Assembly | None:
-        """Assembly of saved bytes; None when they are none."""
+        """Return the assembly of saved bytes; None if they are invalid."""
         try:
             version, digest, count, parts = msgpack.unpackb(saved)
             assembly = cls(int(version), bytes(digest), int(count))

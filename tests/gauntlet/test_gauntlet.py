@@ -76,7 +76,7 @@ def test_seeds_hold_and_repeat_bit_for_bit(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("world", "part"), list(product(range(WORLDS), range(PARTS))))
 def test_combined_seeds_hold(world: int, part: int) -> None:
-    # whoever runs it works out one world, not all of them
+    # each worker computes one world, not all of them
     seeds = [seed for seed in range(1, COMBINED + 1) if seed % WORLDS == world][part::PARTS]
     failed = [outcome for seed in seeds if (outcome := judge_seed((seed, ALL, None, USUAL))).violations]
     assert [(outcome.seed, outcome.kinds, outcome.violations) for outcome in failed] == []
@@ -95,7 +95,7 @@ def test_combined_seeds_hold(world: int, part: int) -> None:
         (72, ("same-number", "encoder-slips")),  # a joint that was solved anew took the slip, against its marks
         (51416, ("cut-again-and-again", "node-memory-lost", "splice")),  # a recorded state of an epoch before the last
         (104026, ("cut-while-saving", "not-finite", "encoder-slips")),  # one rested, the other was blind
-        (102831, ("database-deleted", "gyro-saturated", "encoder-slips")),  # nobody knew any more that one was blind
+        (102831, ("database-deleted", "gyro-saturated", "encoder-slips")),  # it was forgotten that one was blind
         (107936, ("cut-while-saving", "frozen")),  # the power went while it saved what it had missed
         (206677, ("gyro-saturated", "encoder-slips")),  # the one that saw it had just started, the other was blind
         (206003, ("clock-jumps", "joint-severed")),  # an aiding of before a turning came to a clock that was ahead
@@ -129,7 +129,7 @@ def test_combined_seeds_hold(world: int, part: int) -> None:
         (1010316, ("ground-cut", "depth-jumps-down", "depth-backwards")),
         # the first stand was a stop, which was kept shorter than it was
         (1000528, ("encoder-from-zero", "ground-cut", "old-receipts", "database-deleted")),
-        # nor was it when nobody surveyed, and the encoder had started since the bit came to it
+        # nor was it when no tube surveyed, and the encoder had started since the bit came to it
         (1107259, ("encoder-from-zero", "old-receipts", "node-memory-rots", "ground-disk-refuses", "database-deleted")),
         # a stop was judged in the moment of another epoch, before any tube was known
         (1002690, ("encoder-cut", "bytes-rot", "folders-swapped", "database-deleted")),
@@ -156,7 +156,7 @@ def test_combined_seeds_hold(world: int, part: int) -> None:
         (9343416, ("all-cut", "encoder-dead", "encoder-slips")),
         # the first word that came after the ground station had stood still said nothing of a tube
         (9375046, ("frozen", "bytes-rot")),
-        (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
+        (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nothing corrected it
     ],
 )
 def test_seeds_that_failed_once_hold(seed: int, kinds: tuple[str, ...]) -> None:

@@ -18,7 +18,7 @@ from groundstation.service.disk.keeper import Keeper
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.learner import Learner
 from groundstation.survey.fusion.survey_trust import Trust
-from node.firmware.settings import TubeSettings
+from node.firmware.tube_settings import TubeSettings
 from node.process import counter as counter_module
 from node.process.command_handlers import CommandHandlers
 from node.process.tube_process import TubeProcess

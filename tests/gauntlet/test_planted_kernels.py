@@ -15,7 +15,7 @@ from node.firmware.sensor_limits import SensorLimits
 from node.kernels.arithmetic.formats import Array
 from node.kernels.filter.float64.cycle import run_cycle
 from node.kernels.record.node_record import END, JOINED, START
-from node.kernels.step.node_step import REFUSED, enter, leave, say_events
+from node.kernels.step.node_step import REFUSED, begin_step, end_step, say_events
 
 SAMPLES = 32  # cycles, of a survey
 LASTS = 40  # cycles, of a fault that ends within a stop
@@ -29,14 +29,14 @@ class StepInParts:
         node = nodes[0]
         state = node["filter"]
         before = int(state["surveyed"]), int(state["still_cycles"])
-        waits = enter(nodes, settings, parameters, self.seen(readings), moment)
+        waits = begin_step(nodes, settings, parameters, self.seen(readings), moment)
         if waits == REFUSED:
             return say_events(node)
         self.undo(node, *before)
         joined = int(moment[JOINED] != 0.0)
         status = run_cycle(state, node["config"], node["rate"], node["force"], moment[START], moment[END], joined)
         surveyed = int(state["surveyed"])
-        says = leave(nodes, settings, moment, status, waits)
+        says = end_step(nodes, settings, moment, status, waits)
         self.undo(node, surveyed, int(state["still_cycles"]))
         return says
 

@@ -12,7 +12,7 @@ from groundstation.config import GroundConfig
 from groundstation.service.orders.order_book import Order
 from groundstation.service.process.ground_process import GroundProcess
 from node.firmware.sensor_limits import SensorLimits
-from node.firmware.settings import TubeSettings
+from node.firmware.tube_settings import TubeSettings
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess
 from sim.rig.in_process import Build, InProcessStepper

@@ -14,7 +14,7 @@ PASSWORD = "a long enough word"
 
 
 def free_port() -> int:
-    """A port that nobody has now."""
+    """Return a TCP port that is free now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

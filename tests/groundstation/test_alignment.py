@@ -15,7 +15,7 @@ from groundstation.service.orders.order_book import Order
 from groundstation.survey.fusion.resolve import combine_imus
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import RigContext
-from node.firmware.settings import TubeSettings
+from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.process.tube_process import TubeProcess
 from telemetry.messages import ImuMean, Mode, NodeFlag, Stand, SurveyMeasurement

@@ -63,7 +63,7 @@ def test_an_alarm_says_what_where_and_since_when(it: Clock) -> None:
 
 
 def test_what_is_short_is_no_alarm(it: Clock) -> None:
-    """A string whose joint is open for a moment is silent, and nobody need be told."""
+    """A string whose joint is open for a moment is silent, which is not worth an alarm."""
     it.look(SILENT)
     it.look(SILENT, after=DELAYS[Level.DEGRADED] - 1.0)
     it.look()

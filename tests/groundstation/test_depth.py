@@ -185,7 +185,7 @@ def test_a_doubtful_time_stays_doubtful_over_a_start(ends: str) -> None:
 
 
 def test_a_stand_that_began_in_a_doubtful_time_and_goes_on_is_believed_from_its_end_on() -> None:
-    """Whoever was off when the depth returned hears of the return later than it was, in the midst of a stand."""
+    """A process that was off when the depth returned hears of it later, in the midst of a stand."""
     bit = Bit()
     bit.move_to(2.0)
     bit.now += CYCLE

@@ -233,7 +233,7 @@ def test_a_record_that_moved_is_taken_again_and_never_counts(rig: Field) -> None
     rig.collect(PRESETS[:8])
     rig.tell(*PRESETS[8])
     rig.run(3.0)
-    rig.rate[1] = np.array([0.0, 0.0, 0.3])  # somebody leans on tube 1
+    rig.rate[1] = np.array([0.0, 0.0, 0.3])  # a man leans on tube 1
     rig.run(3.0)
     rig.rate[1] = np.zeros(3)
     rig.run(SECONDS)

@@ -302,7 +302,7 @@ def test_a_stream_begins_with_the_whole_picture_and_goes_on_with_what_changes(se
 
 
 def test_a_slow_reader_and_two_hundred_connections_do_not_stop_the_ground_station(served: tuple[Served, int]) -> None:
-    """The crew's own connection is kept open meanwhile; who comes too late is told so, and is let in afterwards."""
+    """The crew's own connection is kept open meanwhile; a late one is told so, and is let in afterwards."""
     page = PageClient(served[1])
     with stream(served[1]) as slow, contextlib.ExitStack() as held:
         read_until(slow, b"event: hello")

@@ -16,7 +16,7 @@ from groundstation.errors import ConfigurationError
 from groundstation.service.orders.blocks import block_of
 from groundstation.service.orders.order_book import OrderState
 from groundstation.service.process.ground_process import GroundProcess
-from node.firmware.settings import TubeSettings
+from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import DEG
 from node.process.block_store import BlockStore
 from node.process.tube_process import TubeProcess

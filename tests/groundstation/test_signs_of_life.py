@@ -50,7 +50,7 @@ def test_tubes_that_start_one_after_the_other_are_all_waited_for(tmp_path: Path)
 
 
 def test_a_recorded_state_without_an_epoch_opens_the_door_for_no_other(tmp_path: Path) -> None:
-    """The first word of a tube knows no rig time; after it those of before looked new."""
+    """The first word of a tube knows no rig time; after it earlier ones looked new."""
     model = RigModel(GroundConfig(folder=tmp_path))
     first, later = node_state(1, at=5.0, cycles=1), replace(node_state(1, at=100.0, cycles=50), epoch=2)
     model.now = model.epoch = 2

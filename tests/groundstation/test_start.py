@@ -27,7 +27,7 @@ def answers(model: RigModel) -> dict[str, bytes]:
 
 @pytest.mark.slow
 def test_a_start_knows_to_the_last_byte_what_was_known_before_it(tmp_path: Path) -> None:
-    """Surveys of a stop that came together, one by one, and with somebody asking after each of them."""
+    """Surveys of a stop that came together, one by one, and with a query after each of them."""
     config = GroundConfig(folder=tmp_path, tube_length=2.0, target=40.0)
     stored = write_day(config.url, STOPS, TUBES)
     hearing = LearningLoad(config, TUBES, BEGUN_AT + ROUND_S * (STOPS + 1))

@@ -101,7 +101,7 @@ def test_a_tube_that_is_heard_first_after_a_start_of_the_encoder_owes_the_survey
 
 
 def test_a_stop_is_judged_when_somebody_is_known_who_could_owe_its_survey() -> None:
-    """A ground station that lost its database, and hears of nobody till the encoder starts again."""
+    """A ground station that lost its database, and hears no tube till the encoder starts again."""
     known = Tally(2.0)
     stops = Stops(known, DUE)
     stops.on_stand(Stand(2, 1000.0, 1040.0, 4.0))

@@ -196,7 +196,7 @@ def test_a_database_that_cannot_be_written_is_read(tmp_path: Path) -> None:
     with closing(Store(url(tmp_path))) as store:
         store.add_message(survey(1, 1), 2.0)
         with closing(sqlite3.connect(tmp_path / "ground.sqlite", isolation_level=None)) as holder:
-            holder.execute("begin immediate")  # nobody else can write
+            holder.execute("begin immediate")  # locks out other writers
             with pytest.raises(StoreError, match="locked"):
                 store.add_message(survey(1, 2), 2.0)
             assert store.refusal

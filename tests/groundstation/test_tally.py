@@ -32,7 +32,7 @@ def test_a_restored_order_holds_until_reports_complete_another() -> None:
     order = Tally(2.0)
     order.restore([3, 2, 1])
     assert order.length_below(3) == 4.0
-    for tube, hops in ((1, 4), (3, 2), (4, 1)):  # tube 4 came while nobody listened; tube 2 is still silent
+    for tube, hops in ((1, 4), (3, 2), (4, 1)):  # tube 4 came without a listener; tube 2 is still silent
         order.on_hops(tube, hops)
         assert [known for known in order.tubes if known != 4] == [3, 2, 1]
     assert order.tubes == [4, 3, 2, 1]

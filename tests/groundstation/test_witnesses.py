@@ -69,7 +69,7 @@ def test_a_time_without_a_gyroscope_is_known_by_its_end_where_its_begin_went_wit
 
 
 def test_a_tube_that_has_just_started_is_enough_where_the_other_has_no_gyroscope() -> None:
-    """What it saved says another thing, and nobody is left who could say that it is its own."""
+    """What it saved says another thing, and no tube is left that could say that it is its own."""
     blind, against = event(2, 7.5, "gyro_saturated", 9), event(1, 9.0, "yaw_reset")
     for events in permutations([blind, against]):
         assert told([*BOTH_STARTED, *events, event(2, 40.0, "stopped", 12)]) == ["tubes 1 at 9 s"]
@@ -123,7 +123,7 @@ def test_a_tube_that_doubts_its_yaw_contradicts_where_its_words_are_lost(doubts:
 def test_a_gyroscope_that_sticks_as_the_encoder_slips_was_no_witness_since_it_contradicted(
     found_at: float, said: list[str]
 ) -> None:
-    """Both began to contradict at one time; what it would have made of the slip, nobody can say."""
+    """Both began to contradict at one time; what it would have made of the slip is unknown."""
     began = [event(1, 100.0, "aiding_rejected"), event(2, 100.0, "aiding_rejected")]
     events = [*began, event(1, 102.0, "yaw_reset", 11), event(2, found_at, "gyro_stuck", 11)]
     assert told([*BOTH_STARTED, *events, event(2, 140.0, "stopped", 12)]) == said
@@ -190,7 +190,7 @@ SWAPPED = [
 
 
 def test_where_all_start_upon_a_yaw_of_another_place_nobody_has_watched_the_encoder() -> None:
-    said = ["nobody watched it before 23 s: what the tubes had saved is of other places"]
+    said = ["no tube watched it before 23 s: what they had saved is of other places"]
     assert told(SWAPPED) == said
     assert told([*BOTH_STARTED, *SWAPPED]) == said
     assert told(SWAPPED, heard=(1, 2, 3)) == []  # tube 3 did
@@ -249,9 +249,9 @@ VOID = [event(2, 22.0, "restored", 12, worth_h=0.0), event(1, 23.0, "restored", 
 @pytest.mark.parametrize(
     ("events", "lately", "said"),
     [
-        (VOID, (1, 2), "nobody watched it before 23 s: no tube has kept its yaw"),
-        ([VOID[0], event(1, 23.0, "booted", (1 << SERIES_SHIFT) + 1)], (1, 2), "nobody watched it before 23 s: "),
-        (VOID[:1], (2,), "nobody watched it before 22 s: "),  # the other one has been silent for long
+        (VOID, (1, 2), "no tube watched it before 23 s: none has kept its yaw"),
+        ([VOID[0], event(1, 23.0, "booted", (1 << SERIES_SHIFT) + 1)], (1, 2), "no tube watched it before 23 s: "),
+        (VOID[:1], (2,), "no tube watched it before 22 s: "),  # the other one has been silent for long
         (VOID[:1], (1, 2), ""),
         ([VOID[0], event(1, 23.0, "restored", 13, worth_h=4.0)], (1, 2), ""),  # stood still when the power went
         ([VOID[0], event(1, 60.0, "restored", 13, worth_h=0.0)], (1, 2), ""),  # watched while the other was off
@@ -266,7 +266,7 @@ def test_where_no_tube_has_kept_its_yaw_nobody_has_watched_the_encoder(
     witnesses = Witnesses()
     for one in (event(1, 1.0, "restored", 1, worth_h=3.0), event(2, 1.0, "booted", 1), *events):
         assert witnesses.on_event(one, lately) == ""
-    assert witnesses.look(1, 30.0, lately) == ""  # whoever watched may be heard yet
+    assert witnesses.look(1, 30.0, lately) == ""  # a tube that watched may be heard yet
     told = witnesses.look(1, 80.0, lately)
     assert told.startswith(said)
     assert bool(told) == bool(said)
@@ -277,7 +277,7 @@ def test_tubes_without_a_yaw_are_told_at_once_where_rig_time_has_begun_anew() ->
     witnesses = Witnesses()
     for one in VOID:
         witnesses.on_event(one, (1, 2))
-    assert witnesses.look(2, 3.0, (1, 2)).startswith("nobody watched")
+    assert witnesses.look(2, 3.0, (1, 2)).startswith("no tube watched")
 
 
 @pytest.mark.parametrize(("start", "growth"), [("booted", 5.0), ("restored", 20.0)])

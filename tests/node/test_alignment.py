@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from node.errors import ConfigurationError
+from node.errors import NodeConfigurationError
 from node.firmware import static_record
-from node.firmware.alignment import FEWEST, METHODS, MOST, rotation
+from node.firmware.alignment_orders import FEWEST, METHODS, MOST, tube_rotation
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.tube import Tube
+from node.firmware.tube_settings import Kernel, TubeSettings
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import new_node
@@ -43,7 +43,7 @@ class Bored:
         self.tube = Tube(settings, config, new_node(config), numbers, restored=False)
         pitch, roll = tilt
         axis = np.array([math.sin(pitch), math.cos(pitch) * math.sin(roll), math.cos(pitch) * math.cos(roll)])
-        self.frame = rotation(axis).T
+        self.frame = tube_rotation(axis).T
         self.lean, self.shake = lean, shake
         self.angle, self.now = 0.4, 1000.0
         self.events: list[Event] = []
@@ -159,7 +159,7 @@ def test_the_sensor_off_the_axis_needs_its_place_to_be_known() -> None:
     errors = []
     for offset in ((0.0, 0.0), (radius, 0.0)):
         bored = Bored(tilt=(0.0, 0.0))
-        bored.tube._crew[0]["place"][0] = offset
+        bored.tube._settings_record[0]["place"][0] = offset
         bored.ordered("circle", 5.0)
         for _ in range(math.ceil(5.1 * math.tau / rate / PERIOD) + 4):
             wx, wy, wz, fx, fy, fz = bored.reading(rate)
@@ -369,5 +369,5 @@ def test_every_command_of_a_tube_has_its_method() -> None:
     "change", [{"offset": (math.nan, 0.0)}, {"offset": (0.0, 2.0)}, {"noise": 0.0}, {"noise": math.inf}]
 )
 def test_settings_of_an_imu_that_cannot_be_are_refused_by_name(change: dict) -> None:
-    with pytest.raises(ConfigurationError, match=next(iter(change))):
+    with pytest.raises(NodeConfigurationError, match=next(iter(change))):
         ImuSettings(**change)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.firmware.alignment import angles_of, rotation
+from node.firmware.alignment_orders import angles_of, tube_rotation
 from node.kernels.arithmetic.formats import DEG
 from node.kernels.record.sensor_record import OFFSET, SWEEP, new_mount
 from node.kernels.sensors.alignment import extreme_var, fit_circle, take_extremes, to_tube
@@ -36,7 +36,7 @@ def swept(
     heading = first - angles
     upright = np.full(angles.shape, np.cos(lean))
     down = np.stack([np.sin(lean) * np.cos(heading), np.sin(lean) * np.sin(heading), upright])
-    force = -G * (rotation(axis_of(pitch, roll)).T @ down).T
+    force = -G * (tube_rotation(axis_of(pitch, roll)).T @ down).T
     force = force + G * noise * np.random.default_rng(seed).standard_normal(force.shape)
     sweep = np.zeros(1, SWEEP)
     for f, angle in zip(force, angles if told is None else told, strict=True):
@@ -139,7 +139,7 @@ def test_the_turn_into_the_tube_is_a_rotation_that_takes_the_axis_to_z(
     turned = vector.copy()
     to_tube(axis, turned)
     assert np.linalg.norm(turned) == pytest.approx(np.linalg.norm(vector), abs=1e-12)
-    np.testing.assert_allclose(turned, rotation(axis) @ vector, atol=1e-12)
+    np.testing.assert_allclose(turned, tube_rotation(axis) @ vector, atol=1e-12)
     held = axis.copy()
     to_tube(axis, held)
     np.testing.assert_allclose(held, [0.0, 0.0, 1.0], atol=1e-15)

@@ -10,16 +10,16 @@ from node.firmware.block_trial import (
     DIFFER_CYCLES,
     STILL_CYCLES,
     Trial,
-    Verdict,
+    TrialVerdict,
     record_of,
-    recorrect,
-    refusal,
-    unfit,
+    recorrect_ring,
+    refusal_reason,
+    unfit_reason,
 )
 from node.kernels.arithmetic.formats import DEG
 from node.kernels.filter.resets import forget_bias
 from node.kernels.record.filter_record import Err, default_config, new_state
-from node.kernels.sensors.correction import calibrate
+from node.kernels.sensors.correction import correct_cycle
 from telemetry.messages import Matrix3
 from telemetry.parameters import UNIT, ZERO, ParameterBlock, SensorParameters
 
@@ -57,27 +57,27 @@ def with_gyroscope(**change: object) -> ParameterBlock:
     ],
 )
 def test_a_block_that_cannot_be_is_refused_by_name(block: ParameterBlock, reason: str) -> None:
-    assert reason in refusal(block, 3, IDENTITY)
+    assert reason in refusal_reason(block, 3, IDENTITY)
 
 
 def test_a_usual_block_is_tried() -> None:
     block = with_gyroscope(
         matrix=diagonal(0.99), bias=(0.0, 3.8 * DEG, 0.0), matrix_slopes=(diagonal(2e-4),) * 1 + (diagonal(0.0),) * 2
     )
-    assert refusal(block, 3, IDENTITY) == ""
+    assert refusal_reason(block, 3, IDENTITY) == ""
 
 
 def test_a_matrix_near_the_last_is_taken_and_read_again_after_a_restart() -> None:
     last = ParameterBlock(3, 4, SensorParameters(diagonal(1.15)))
     block = ParameterBlock(3, 5, SensorParameters(diagonal(1.3)))
-    assert "within" in refusal(replace(block), 3, IDENTITY)
-    assert refusal(block, 3, last) == ""
-    assert unfit(block, 3) == ""
+    assert "within" in refusal_reason(replace(block), 3, IDENTITY)
+    assert refusal_reason(block, 3, last) == ""
+    assert unfit_reason(block, 3) == ""
 
 
 @pytest.mark.parametrize("version", [0, 4, 5])
 def test_only_a_newer_version_is_taken(version: int) -> None:
-    assert "version" in refusal(ParameterBlock(3, version), 3, ParameterBlock(3, 5))
+    assert "version" in refusal_reason(ParameterBlock(3, version), 3, ParameterBlock(3, 5))
 
 
 def test_the_record_of_no_correction_is_the_identity() -> None:
@@ -88,40 +88,40 @@ def test_the_record_of_no_correction_is_the_identity() -> None:
 def test_a_trial_waits_for_rest_and_counts_anew_after_motion() -> None:
     trial = Trial(with_gyroscope(bias=(1e-4, 0.0, 0.0)), 9.81)
     for standing in (False, True, True, True, False, True, True, True):
-        assert trial.judge_reading(*REST, standing=standing, quiet=standing) is Verdict.WAIT
-    assert trial.judge_reading(*REST, standing=True, quiet=True) is Verdict.APPLY
+        assert trial.judge_reading(*REST, standing=standing, quiet=standing) is TrialVerdict.WAIT
+    assert trial.judge_reading(*REST, standing=True, quiet=True) is TrialVerdict.APPLY
 
 
 def test_a_block_that_gives_a_node_at_rest_a_rate_is_refused() -> None:
     trial = Trial(with_gyroscope(bias=(3.0 * DEG, 0.0, 0.0)), 9.81)
     verdicts = [trial.judge_reading(*REST, standing=True, quiet=True) for _ in range(DIFFER_CYCLES)]
-    assert verdicts == [Verdict.WAIT] * (DIFFER_CYCLES - 1) + [Verdict.REFUSE]
+    assert verdicts == [TrialVerdict.WAIT] * (DIFFER_CYCLES - 1) + [TrialVerdict.REFUSE]
     assert "3 deg/s" in trial.reason
 
 
 def test_a_block_that_makes_gravity_another_is_refused() -> None:
     trial = Trial(ParameterBlock(3, 1, accelerometer=SensorParameters(diagonal(1.1))), 9.81)
     verdicts = [trial.judge_reading(*REST, standing=True, quiet=True) for _ in range(DIFFER_CYCLES)]
-    assert verdicts[-1] is Verdict.REFUSE
+    assert verdicts[-1] is TrialVerdict.REFUSE
 
 
 def test_the_first_block_of_a_node_that_reads_a_rate_at_rest_is_applied() -> None:
     trial = Trial(with_gyroscope(bias=(0.0, 3.8 * DEG, 0.0)), 9.81)
     reading = ((0.0, 3.8 * DEG, 0.0), REST[1], 25.0)
     verdicts = [trial.judge_reading(*reading, standing=True, quiet=False) for _ in range(STILL_CYCLES)]
-    assert verdicts[-1] is Verdict.APPLY
+    assert verdicts[-1] is TrialVerdict.APPLY
 
 
 def test_a_block_that_does_not_fit_a_node_of_unknown_bias_waits_for_ever() -> None:
     trial = Trial(with_gyroscope(bias=(0.0, -3.8 * DEG, 0.0)), 9.81)
     reading = ((0.0, 3.8 * DEG, 0.0), REST[1], 25.0)
-    assert {trial.judge_reading(*reading, standing=True, quiet=False) for _ in range(100)} == {Verdict.WAIT}
+    assert {trial.judge_reading(*reading, standing=True, quiet=False) for _ in range(100)} == {TrialVerdict.WAIT}
 
 
 def test_a_reading_that_is_no_number_decides_nothing() -> None:
     trial = Trial(with_gyroscope(bias=(1e-4, 0.0, 0.0)), 9.81)
     reading = ((math.nan, 0.0, 0.0), REST[1], 25.0)
-    assert {trial.judge_reading(*reading, standing=True, quiet=True) for _ in range(100)} == {Verdict.WAIT}
+    assert {trial.judge_reading(*reading, standing=True, quiet=True) for _ in range(100)} == {TrialVerdict.WAIT}
 
 
 def test_forgetting_the_bias_leaves_the_yaw() -> None:
@@ -150,9 +150,9 @@ def test_what_waits_in_the_ring_is_read_by_the_new_block() -> None:
     raw = np.random.default_rng(1).standard_normal((64, 6))
     expected = raw.copy()
     for k in range(64):
-        calibrate(record_of(before)[0], 31.0, raw[k, :3], raw[k, 3:])
-        calibrate(record_of(after)[0], 31.0, expected[k, :3], expected[k, 3:])
+        correct_cycle(record_of(before)[0], 31.0, raw[k, :3], raw[k, 3:])
+        correct_cycle(record_of(after)[0], 31.0, expected[k, :3], expected[k, 3:])
     state[0]["ring_rate"], state[0]["ring_force"] = raw[:, :3], raw[:, 3:]
-    recorrect(state[0], before, after, 31.0)
+    recorrect_ring(state[0], before, after, 31.0)
     np.testing.assert_allclose(state[0]["ring_rate"], expected[:, :3], atol=1e-12)
     np.testing.assert_allclose(state[0]["ring_force"], expected[:, 3:], atol=1e-12)

@@ -13,7 +13,7 @@ from groundstation.calibration.block import Calibration, Provenance, model_of
 from groundstation.service.orders.blocks import block_of
 from node.firmware.block_trial import record_of
 from node.kernels.arithmetic.formats import DEG
-from node.kernels.sensors.correction import COLDEST, HOTTEST, USUAL, calibrate, identity_parameters
+from node.kernels.sensors.correction import COLDEST, HOTTEST, USUAL, correct_cycle, identity_parameters
 from telemetry.messages import Matrix3
 from telemetry.parameters import ParameterBlock, SensorParameters
 
@@ -37,7 +37,7 @@ def sensors(draw: st.DrawFn) -> SensorParameters:
 
 def corrected(block: ParameterBlock, rate: tuple, force: tuple, temperature: float) -> tuple[np.ndarray, np.ndarray]:
     w, f = np.array(rate), np.array(force)
-    calibrate(record_of(block)[0], temperature, w, f)
+    correct_cycle(record_of(block)[0], temperature, w, f)
     return w, f
 
 
@@ -63,7 +63,7 @@ ANY = st.floats(allow_nan=True, allow_infinity=True)
 @given(st.tuples(ANY, ANY, ANY), st.tuples(ANY, ANY, ANY), ANY)
 def test_the_identity_touches_no_bit(rate: tuple, force: tuple, temperature: float) -> None:
     w, f = np.array(rate), np.array(force)
-    calibrate(identity_parameters()[0], temperature, w, f)
+    correct_cycle(identity_parameters()[0], temperature, w, f)
     assert w.tobytes() + f.tobytes() == struct.pack("6d", *rate, *force)
 
 

@@ -11,8 +11,8 @@ import pytest
 from borechain.drilling.inline import InlineRig
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
-from node.firmware.settings import Joint, Kernel, TubeSettings
 from node.firmware.tube import Tube
+from node.firmware.tube_settings import Kernel, MakeUpAngle, TubeSettings
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.filter.resets import open_yaw
 from node.kernels.record.filter_record import Err, default_config
@@ -79,7 +79,7 @@ def turning(kernel: Kernel) -> Bench:
     """A tube that has learnt its clock's error from a turning, and turns on."""
     config = default_config()
     limits = SensorLimits(repeats_together=0, repeats_alone=0)
-    settings = TubeSettings(3, Joint(0.0, 0.0), Joint(0.0, 0.0), kernel=kernel, limits=limits)
+    settings = TubeSettings(3, MakeUpAngle(0.0, 0.0), MakeUpAngle(0.0, 0.0), kernel=kernel, limits=limits)
     bench = Bench(Tube(settings, config, new_node(config), iter(range(1, 10**6)).__next__, restored=False))
     bench.cycles(120)
     bench.cycles(RAMP, to=SPIN)

@@ -12,19 +12,19 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from groundstation.survey.fusion.resolve import combine_imus
-from node.errors import ConfigurationError
-from node.firmware.alignment import rotation
+from node.errors import NodeConfigurationError
+from node.firmware.alignment_orders import tube_rotation
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.tube import Tube
+from node.firmware.tube_settings import Kernel, TubeSettings
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.record.filter_record import Err, default_config
 from node.kernels.record.node_record import new_node
 from node.kernels.record.sensor_record import MAX_IMUS
-from node.kernels.sensors.cluster import fuse
+from node.kernels.sensors.cluster import fuse_readings
 from node.kernels.sensors.cluster_watch import DISAGREEING, HEALTHY
-from node.process.drivers.replay import ReplayImu
+from node.process.drivers.replay_drivers import ReplayImu
 from node.process.reading import reading_of
 from node.process.tube_command import node as command
 from node.process.tube_process import TubeProcess
@@ -60,7 +60,7 @@ class Clustered:
         self.frames = [np.eye(3)] * len(noises)
         for k, (pitch, roll) in enumerate(tilts):
             axis = np.array([math.sin(pitch), math.cos(pitch) * math.sin(roll), math.cos(pitch) * math.cos(roll)])
-            self.frames[k] = rotation(axis).T
+            self.frames[k] = tube_rotation(axis).T
         self.angle, self.now = 0.4, 1000.0
         self.spoilt: dict[int, object] = {}  # IMU from 0: rates and forces added, a reading instead, or the last one
         self.last: list[list[float]] = []
@@ -118,11 +118,11 @@ def test_the_fused_reading_is_the_mean_by_inverse_variance(count: int, data: st.
     fused = np.empty(6)
     if not weights.any():
         weights[0] = 1.0
-    fuse(readings, weights, fused)
+    fuse_readings(readings, weights, fused)
     np.testing.assert_allclose(fused, weights @ readings / weights.sum(), atol=1e-9)
     spoilt = np.where(weights[:, None] > 0.0, readings, np.nan)
     again = np.empty(6)
-    fuse(spoilt, weights, again)
+    fuse_readings(spoilt, weights, again)
     np.testing.assert_array_equal(again, fused)
 
 
@@ -308,7 +308,7 @@ def test_an_imu_that_sits_the_other_way_round_is_corrected_by_itself(count: int)
 @pytest.mark.parametrize("sensor", ["gyroscope", "accelerometer"])
 @pytest.mark.parametrize("matrix", [((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.0)), ((math.nan,) * 3,) * 3])
 def test_a_correction_that_cannot_be_is_refused_by_name(sensor: str, matrix: tuple) -> None:
-    with pytest.raises(ConfigurationError, match=sensor):
+    with pytest.raises(NodeConfigurationError, match=sensor):
         ImuSettings(**{sensor: SensorParameters(matrix=matrix)})
 
 
@@ -366,14 +366,14 @@ def test_sources_of_a_board_are_fused_and_one_that_ends_is_told_by_its_number(tm
             np.testing.assert_allclose([*raw.rate, *raw.force], wanted, atol=1e-12)
     assert told == [("sensor_failed", 2)]
     assert process.nodes[0]["cluster"]["used"][:2].tolist() == [1, 0]
-    with pytest.raises(ConfigurationError, match="2 sources"):
+    with pytest.raises(NodeConfigurationError, match="2 sources"):
         TubeProcess(settings, tmp_path / "other", imus=sources[:1])
 
 
 def test_settings_of_a_cluster_that_cannot_be_are_refused_by_name() -> None:
-    with pytest.raises(ConfigurationError, match="imus"):
+    with pytest.raises(NodeConfigurationError, match="imus"):
         TubeSettings(1, imus=())
-    with pytest.raises(ConfigurationError, match="imus"):
+    with pytest.raises(NodeConfigurationError, match="imus"):
         TubeSettings(1, imus=(ImuSettings(),) * (MAX_IMUS + 1))
 
 

@@ -9,7 +9,7 @@ import pytest
 from numba import config
 
 COUNT_COMPILATIONS = """
-from node.kernels.step.warm import warm_up
+from node.kernels.step.precompile import warm_up
 from node.kernels.step.node_step import node_aiding, node_step
 warm_up()
 for function in (node_step, node_aiding):
@@ -21,9 +21,10 @@ from importlib import import_module
 import numpy as np
 from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
-from node.kernels.sensors.correction import calibrate, identity_parameters
-from node.kernels.record.filter_record import PERIOD, default_config, new_state
-from node.kernels.sensors.static_average import STATIC, add_static, has_moved
+from node.kernels.sensors.correction import correct_cycle, identity_parameters
+from node.kernels.record.filter_record import default_config, new_state
+from node.kernels.record.sensor_record import STATIC
+from node.kernels.sensors.static_average import add_static, has_moved
 
 run_cycle = import_module(os.environ["CYCLE"]).run_cycle
 offer_aiding = import_module(os.environ["RELAY"]).offer_aiding
@@ -38,7 +39,7 @@ def drive(state, config, parameters, average, raw_rate, raw_force, cycles):
             rate[i], force[i] = raw_rate[i], raw_force[i]
         add_static(average, rate, force, 30.0, 1)
         has_moved(average, 3.0)
-        calibrate(parameters, 30.0, rate, force)
+        correct_cycle(parameters, 30.0, rate, force)
         run_cycle(state, config, rate, force, start, start + 0.5, 1)
         offer_aiding(state, config, 0.1, 1e-6, 1e-6, 0.0, start + 0.4, k, 0)
 
@@ -140,7 +141,7 @@ def test_the_cache_follows_the_sources() -> None:
     ("cycle", "relay"),
     [
         ("node.kernels.filter.float64.cycle", "node.kernels.string.relay"),
-        ("node.kernels.published.cycle", "node.kernels.published.cycle"),
+        ("sim.studies.published_form.feed_forward", "sim.studies.published_form.feed_forward"),
     ],
 )
 def test_a_cycle_allocates_nothing(cycle: str, relay: str, unoptimised: dict[str, str]) -> None:

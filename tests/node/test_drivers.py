@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from emulated_mpu6500 import EmulatedMpu6500
 
-from node.errors import ConfigurationError, SensorError
-from node.firmware.settings import TubeSettings
+from node.errors import NodeConfigurationError, SensorError
+from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.process.drivers.choice import encoder_source, imu_source
 from node.process.drivers.mpu6500 import Mpu6500, open_bus
 from node.process.drivers.quadrature import QuadratureFile
-from node.process.drivers.replay import ReplayEncoder, ReplayImu
+from node.process.drivers.replay_drivers import ReplayEncoder, ReplayImu
 from node.process.drivers.source import SafeEncoder, SafeImu
 from node.process.drivers.timed import TimedEncoder, TimedImu
 from node.process.encoder_process import EncoderProcess
@@ -303,10 +303,10 @@ def test_sources_are_chosen_by_name(tmp_path: Path) -> None:
     assert isinstance(encoder_source(f"replay:{recording}"), ReplayEncoder)
     assert isinstance(encoder_source(f"timed:{recording}"), TimedEncoder)
     for text in ("", "replay:", "mpu6500:", "mpu6500:x", "mpu6500:-1", "mpu6500:1:0x70", "mpu9250:1"):
-        with pytest.raises(ConfigurationError, match="imu: expected"):
+        with pytest.raises(NodeConfigurationError, match="imu: expected"):
             imu_source(text)
     for text in ("", "counter:", "counter", "file:x"):
-        with pytest.raises(ConfigurationError, match="counter: expected"):
+        with pytest.raises(NodeConfigurationError, match="counter: expected"):
             encoder_source(text)
 
 

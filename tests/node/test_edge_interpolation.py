@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node.firmware.edge_interpolation import EDGES, FEWEST, UNKNOWN, stopped_at
-from node.firmware.encoder import STOP_STD, EncoderNode, EncoderSample
+from node.firmware.encoder_node import STOP_STD, EncoderNode, EncoderSample
 from node.kernels.string.encoder_step import EDGE_STD, QUANTUM
 from sim.world.disc import Disc
 from sim.world.motion import Motion, Trapezoid

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from node.firmware.encoder import EncoderNode, EncoderSample
+from node.firmware.encoder_node import EncoderNode, EncoderSample
 from node.kernels.string.encoder_step import EDGE_STD, QUANTUM
 
 

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node.kernels.arithmetic.formats import PERIOD
-from node.kernels.filter.float64.propagation import propagate
-from node.kernels.filter.float64.update import innovation_var, joseph
+from node.kernels.filter.float64.propagation import propagate_covariance
+from node.kernels.filter.float64.update import innovation_var, joseph_update
 from node.kernels.record.filter_record import STATES, Err, default_config
 
 
@@ -28,7 +28,7 @@ def transition(wz: float, dt: float) -> np.ndarray:
         for j in range(i, STATES):
             P = np.zeros((STATES, STATES))
             P[i, j] = P[j, i] = 1.0
-            propagate(P, wz, dt, 1.0, config[0])
+            propagate_covariance(P, wz, dt, 1.0, config[0])
             if i == j:
                 f[:, i] = np.sqrt(np.diag(P))
     return f
@@ -53,7 +53,7 @@ def test_bias_variance_settles_at_the_gauss_markov_variance() -> None:
     config = default_config()
     P = np.zeros((STATES, STATES))
     for _ in range(2000):
-        propagate(P, 0.0, PERIOD, 1.0, config[0])
+        propagate_covariance(P, 0.0, PERIOD, 1.0, config[0])
     for axis in range(3):
         assert P[Err.BIAS_X + axis, Err.BIAS_X + axis] == pytest.approx(config[0]["bias_std"][axis] ** 2, rel=1e-6)
 
@@ -63,14 +63,14 @@ def test_angle_random_walk_alone_grows_as_the_root_of_time() -> None:
     config[0]["bias_std"] = 0.0
     P = np.zeros((STATES, STATES))
     for _ in range(190):
-        propagate(P, 0.0, PERIOD, 1.0, config[0])
+        propagate_covariance(P, 0.0, PERIOD, 1.0, config[0])
     assert math.sqrt(P[Err.YAW, Err.YAW]) == pytest.approx(config[0]["gyro_noise"][2] * math.sqrt(100.0))
 
 
 @given(st.integers(0, 10_000), st.floats(-6.0, 6.0), st.floats(1e-3, 5.0))
 def test_covariance_stays_symmetric_and_positive(seed: int, wz: float, dt: float) -> None:
     P = random_covariance(seed)
-    propagate(P, wz, dt, 1.0, default_config()[0])
+    propagate_covariance(P, wz, dt, 1.0, default_config()[0])
     assert np.array_equal(P, P.T)
     assert np.linalg.eigvalsh(P).min() > -1e-9 * np.trace(P)
 
@@ -82,7 +82,7 @@ def test_joseph_form_is_the_textbook_update(seed: int, r_var: float) -> None:
     before = P.copy()
     ph, gain = np.zeros(STATES), np.zeros(STATES)
     s = innovation_var(P, h, r_var, ph)
-    joseph(P, ph, s, gain)
+    joseph_update(P, ph, s, gain)
     k = before @ h / (h @ before @ h + r_var)
     left = np.eye(STATES) - np.outer(k, h)
     expected = left @ before @ left.T + r_var * np.outer(k, k)

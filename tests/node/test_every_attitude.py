@@ -1,4 +1,4 @@
-"""The whole cycle of a tube at every inclination and rotation: no number that is none, no jump, no variance below 0."""
+"""The whole cycle of a tube at every inclination and rotation: no NaN, no jump, no variance below 0."""
 
 import math
 
@@ -8,9 +8,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.arithmetic.angles import wrap
+from node.firmware.tube_settings import TubeSettings
+from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import new_node
@@ -78,7 +78,7 @@ class Walk:
         self.flags |= self.tube.flags(around, self.now)
         turned, before_place = yaw - self.place[1], self.place[0]
         if known and inclination < INVERTED and NodeFlag.YAW_UNTRUSTED not in self.flags:
-            self.jump = max(self.jump, abs(wrap(self.tube.yaw - before - turned)))
+            self.jump = max(self.jump, abs(wrap_angle(self.tube.yaw - before - turned)))
         self.sequence += turned != 0.0 or inclination != before_place or not self.sequence
         self.place = (inclination, yaw)
         if self.aided or self.sequence == 1:
@@ -101,7 +101,7 @@ class Walk:
         assert self.tube.yaw_var > 0.0
 
     def error(self) -> float:
-        return abs(wrap(self.tube.yaw - self.place[1]))
+        return abs(wrap_angle(self.tube.yaw - self.place[1]))
 
 
 ANGLES = st.floats(0.0, math.pi)

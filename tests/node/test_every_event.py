@@ -10,8 +10,8 @@ import pytest
 from node.firmware.event_table import EVENT_TABLE, take_events
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
+from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.record.events import Code
 from node.kernels.record.filter_record import default_config

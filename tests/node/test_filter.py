@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels.arithmetic.angles import from_binary, wrap
+from node.kernels.arithmetic.angles import from_binary, wrap_angle
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.filter.float64.cycle import run_cycle
-from node.kernels.filter.float64.fixed_lag import spin
-from node.kernels.record.filter_record import Err, Status, default_config, new_state
-from node.kernels.record.ring import push
+from node.kernels.filter.float64.fixed_lag import mean_spin
+from node.kernels.record.filter_record import CycleStatus, Err, default_config, new_state
+from node.kernels.record.ring import push_increments
 from node.kernels.string.relay import offer_aiding
 from telemetry.messages import Mode
 
@@ -36,7 +36,7 @@ class Bench:
     def record(self) -> np.void:
         return self.state[0]
 
-    def cycle(self, rate: float = 0.0, joined: int = 1) -> Status:
+    def cycle(self, rate: float = 0.0, joined: int = 1) -> CycleStatus:
         end = self.now + PERIOD
         middle = self.yaw + 0.5 * rate * PERIOD
         force = 9.81 * np.array(
@@ -46,7 +46,7 @@ class Bench:
         status = run_cycle(self.record, self.config[0], measured, force, self.now, end, joined)
         self.now = end
         self.yaw += rate * PERIOD
-        return Status(status)
+        return CycleStatus(status)
 
     def aid(
         self, rate: float = 0.0, age: float = 0.0, *, stamp_error: float = 0.0, fresh: bool = True, offset: float = 0.0
@@ -65,7 +65,7 @@ class Bench:
         )
 
     def error_deg(self) -> float:
-        return wrap(from_binary(self.record["now_yaw"]) - self.yaw) / DEG
+        return wrap_angle(from_binary(self.record["now_yaw"]) - self.yaw) / DEG
 
     def stand(self, cycles: int, *, aided: bool = True) -> None:
         for _ in range(cycles):
@@ -84,7 +84,7 @@ def test_static_bias_is_learned_in_fifty_seconds_and_then_yaw_stands() -> None:
     statuses = []
     for _ in range(96):
         statuses.append(bench.cycle())
-    assert Status.BIAS_KNOWN in statuses[94]
+    assert CycleStatus.BIAS_KNOWN in statuses[94]
     assert bench.record["static_bias"][2] == pytest.approx(-0.02 * DEG)
     assert bench.record["mode"] in (Mode.TRACKING, Mode.STILL)
     assert bench.record["static_bias_var"][2] > 0.0
@@ -150,14 +150,14 @@ def test_a_wrong_aiding_is_refused_and_a_lasting_one_believed() -> None:
     bench.yaw += 0.5
     bench.aid(SPIN)
     bench.yaw -= 0.5
-    assert Status.REJECTED in bench.cycle(SPIN) | bench.cycle(SPIN)
+    assert CycleStatus.REJECTED in bench.cycle(SPIN) | bench.cycle(SPIN)
     assert abs(bench.error_deg()) < 0.1
     bench.yaw += 0.5
-    seen = Status.NONE
+    seen = CycleStatus.NONE
     for _ in range(8):
         seen |= bench.cycle(SPIN)
         bench.aid(SPIN)
-    assert Status.YAW_RESET in seen
+    assert CycleStatus.YAW_RESET in seen
     bench.spin(10)
     assert abs(bench.error_deg()) < 0.2
 
@@ -197,14 +197,14 @@ def test_a_new_joint_above_reopens_the_yaw_without_a_false_alarm() -> None:
         bench.record, bench.config[0], bench.yaw - 0.3 + 0.1 * DEG, 1e-9, 2 * joint_std**2, 0.3, bench.now, 99, 1
     )
     seen = bench.cycle() | bench.cycle() | bench.cycle()
-    assert Status.REJECTED not in seen
+    assert CycleStatus.REJECTED not in seen
     assert bench.error_deg() == pytest.approx(0.1, abs=0.02)
 
 
 def test_too_fast_a_string_is_flagged_and_never_aliased() -> None:
     bench = Bench()
     bench.stand(110)
-    assert Status.RATE_EXCEEDED in bench.cycle(2.0 * math.pi * 0.96)
+    assert CycleStatus.RATE_EXCEEDED in bench.cycle(2.0 * math.pi * 0.96)
     assert bench.record["yaw_known"] == 0
     bench.cycle(SPIN)
     bench.spin(4)
@@ -218,7 +218,7 @@ def test_a_stop_gives_one_survey_after_the_moving_average_has_settled() -> None:
     bench.spin(30)
     ready = []
     for k in range(80):
-        if Status.SURVEY_READY in bench.cycle():
+        if CycleStatus.SURVEY_READY in bench.cycle():
             ready.append(k)
         bench.aid(fresh=k == 0)
     assert ready == [int(bench.config[0]["settle_cycles"]) - 1]
@@ -232,10 +232,10 @@ def test_while_the_joint_is_open_the_node_holds_its_yaw() -> None:
     bench = Bench(bias_z=0.01 * DEG)
     bench.stand(110)
     held = [bench.cycle(joined=0) for _ in range(200)]
-    assert [Status.JOINT_OPENED in status for status in held] == [True] + [False] * 199
+    assert [CycleStatus.JOINT_OPENED in status for status in held] == [True] + [False] * 199
     assert bench.record["mode"] == Mode.HELD
     assert abs(bench.error_deg()) < 0.01
-    assert Status.JOINT_CLOSED in bench.cycle()
+    assert CycleStatus.JOINT_CLOSED in bench.cycle()
     assert bench.record["mode"] == Mode.STILL
 
 
@@ -247,7 +247,7 @@ def test_a_sample_that_is_no_number_changes_nothing(bad: float) -> None:
     status = run_cycle(
         bench.record, bench.config[0], np.array([0, 0, bad]), np.zeros(3), bench.now, bench.now + PERIOD, 1
     )
-    assert Status(status) == Status.BAD_SAMPLE
+    assert CycleStatus(status) == CycleStatus.BAD_SAMPLE
     assert bench.state.tobytes() == before
 
 
@@ -255,7 +255,7 @@ def ramp(rates: list[float]) -> np.void:
     """State of a node that read the mean spins ``rates`` (rad/s)."""
     state = new_state(default_config())[0]
     for k, rate in enumerate(rates):
-        push(state, START + k * PERIOD, START + (k + 1) * PERIOD, np.array([0.0, 0.0, rate]), np.zeros(3), 0)
+        push_increments(state, START + k * PERIOD, START + (k + 1) * PERIOD, np.array([0.0, 0.0, rate]), np.zeros(3), 0)
     return state
 
 
@@ -264,7 +264,7 @@ def test_inside_a_cycle_the_spin_is_that_of_a_ramp(begin_rate: float, slope: flo
     state = ramp([begin_rate + slope * (k + 0.5) * PERIOD for k in range(3)])
     begin, end = START + (1.0 + min(a, b)) * PERIOD, START + (1.0 + max(a, b)) * PERIOD
     expected = begin_rate + slope * (0.5 * (begin + end) - START)
-    assert spin(state, 1, begin, end) == pytest.approx(expected, abs=1e-9)
+    assert mean_spin(state, 1, begin, end) == pytest.approx(expected, abs=1e-9)
 
 
 @given(st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=3), st.floats(0.0, 1.0))
@@ -272,7 +272,7 @@ def test_the_parts_of_a_cycle_turn_as_far_as_the_whole(rates: list[float], part:
     state = ramp(rates)
     begin, end = START + PERIOD, START + 2.0 * PERIOD
     middle = begin + part * PERIOD
-    parts = spin(state, 1, begin, middle) * (middle - begin) + spin(state, 1, middle, end) * (end - middle)
+    parts = mean_spin(state, 1, begin, middle) * (middle - begin) + mean_spin(state, 1, middle, end) * (end - middle)
     assert parts == pytest.approx(rates[1] * PERIOD, abs=1e-9)
 
 
@@ -296,10 +296,10 @@ def test_an_aiding_that_came_too_late_is_judged_when_it_is_repeated() -> None:
     bench.stand(40)
     bench.yaw += 10.0 * DEG  # the encoder slips
     bench.aid(age=60.0)
-    dropped = Status.NONE
+    dropped = CycleStatus.NONE
     for _ in range(3):
         dropped |= bench.cycle()
-    assert dropped & Status.LATE_DROPPED
+    assert dropped & CycleStatus.LATE_DROPPED
     assert bench.error_deg() == pytest.approx(-10.0, abs=0.1)
     for _ in range(12):
         bench.aid(fresh=False)

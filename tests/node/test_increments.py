@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from one_node import node_of
 
 from node.kernels.arithmetic.formats import DEG, PERIOD
-from node.kernels.filter.increments import bent_angle, faster
+from node.kernels.filter.increments import bent_angle, mean_excess_rate
 from node.kernels.record.filter_record import (
     BEGAN_STILL,
     ENDED_STILL,
@@ -25,7 +25,7 @@ from node.kernels.record.node_record import BEHIND, LATE, PART, READING, SPLIT, 
 from node.kernels.record.ring import is_split, stood_still
 from node.kernels.sensors.correction import identity_parameters
 from node.kernels.step.node_step import node_step
-from node.process.drivers.parts import parts_of
+from node.process.drivers.fifo_window import parts_of
 
 INSIDE = st.floats(0.0, 1.0)
 CYCLES = 5
@@ -49,7 +49,7 @@ def ring_of(turned: Course) -> np.void:
 
 def angle(state: np.void, begin: float, end: float) -> float:
     """What the ring says was turned from ``begin`` to ``end`` of the middle cycle."""
-    return float((state["ring_rate"][MIDDLE, 2] + faster(state, MIDDLE, begin, end)) * (end - begin))
+    return float((state["ring_rate"][MIDDLE, 2] + mean_excess_rate(state, MIDDLE, begin, end)) * (end - begin))
 
 
 @given(st.floats(-1.2, 1.2), st.floats(-0.6, 0.6), INSIDE, INSIDE)

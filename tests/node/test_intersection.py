@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels.filter.float64.update import innovation_var, intersect, joseph
+from node.kernels.filter.float64.update import innovation_var, intersect_covariance, joseph_update
 from node.kernels.record.filter_record import STATES, Err
 
 PSI = int(Err.YAW)
@@ -38,7 +38,7 @@ def after(P: np.ndarray, r_var: float, weight: float) -> np.ndarray:
 def test_the_weight_has_the_least_determinant(seed: int, yaw_var: float, r_var: float) -> None:
     P = covariance(seed, yaw_var)
     widened, ph = P.copy(), np.zeros(STATES)
-    weight = intersect(widened, row(), r_var, ph)
+    weight = intersect_covariance(widened, row(), r_var, ph)
     assert 0.0 < weight <= 1.0
     if weight == 1.0:
         np.testing.assert_array_equal(widened, P)
@@ -49,7 +49,7 @@ def test_the_weight_has_the_least_determinant(seed: int, yaw_var: float, r_var: 
     for other in (0.9 * weight, weight + 0.1 * (1.0 - weight)):
         assert np.linalg.slogdet(after(P, r_var, other))[1] >= least - 1e-9
     s = innovation_var(widened, row(), r_var / (1.0 - weight), ph)
-    joseph(widened, ph, s, np.zeros(STATES))
+    joseph_update(widened, ph, s, np.zeros(STATES))
     np.testing.assert_allclose(widened, after(P, r_var, weight), rtol=1e-6, atol=1e-9)
 
 
@@ -57,9 +57,9 @@ def test_the_weight_has_the_least_determinant(seed: int, yaw_var: float, r_var: 
 def test_no_correlation_makes_it_overconfident(seed: int, yaw_var: float, correlation: float) -> None:
     P, r_var = covariance(seed, yaw_var), 1e-6
     widened, ph, gain = P.copy(), np.zeros(STATES), np.zeros(STATES)
-    weight = intersect(widened, row(), r_var, ph)
+    weight = intersect_covariance(widened, row(), r_var, ph)
     assert weight < 1.0
-    joseph(widened, ph, innovation_var(widened, row(), r_var / (1.0 - weight), ph), gain)
+    joseph_update(widened, ph, innovation_var(widened, row(), r_var / (1.0 - weight), ph), gain)
     # errors e of the estimate and v of the measurement, correlated through the yaw: e+ = (I - K h) e + K v
     cross = correlation * math.sqrt(r_var / P[PSI, PSI]) * P[:, PSI]
     keep = np.eye(STATES) - np.outer(gain, row())

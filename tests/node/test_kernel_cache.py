@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = (
-    "import subprocess, sys; from numba import config; from node.kernels import jit; print(config.CACHE_DIR);"
+    "import subprocess, sys; from numba import config; import node.kernels.arithmetic.jit; print(config.CACHE_DIR);"
     "subprocess.run([sys.executable, '-c', 'import node.kernels.arithmetic.jit'], check=True)"
 )
 
@@ -67,12 +67,12 @@ def digest_in(folder: Path) -> str:
 
 @pytest.mark.slow
 def test_a_copy_of_the_sources_loads_what_was_compiled_of_them(tmp_path: Path) -> None:
-    from node.kernels.step.warm import warm_up
+    from node.kernels.step.precompile import warm_up
 
     warm_up()
     program = """
 import node, node.kernels.step.node_step as step
-from node.kernels.step.warm import warm_up
+from node.kernels.step.precompile import warm_up
 warm_up()
 print(node.__file__)
 print([sum(function.stats.cache_misses.values()) for function in (step.node_step, step.node_aiding)])
@@ -86,7 +86,7 @@ print([sum(function.stats.cache_misses.values()) for function in (step.node_step
 def test_an_edited_kernel_is_another(tmp_path: Path) -> None:
     digest = digest_in(copied(tmp_path))
     assert digest == digest_in(ROOT)
-    with (tmp_path / "node" / "kernels" / "angles.py").open("a") as kernel:
+    with (tmp_path / "node" / "kernels" / "turns" / "gates.py").open("a") as kernel:
         kernel.write("# edited\n")
     assert digest_in(tmp_path) != digest
 

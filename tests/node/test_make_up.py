@@ -7,8 +7,8 @@ import pytest
 
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
-from node.firmware.settings import Joint, JointRule, TubeSettings
 from node.firmware.tube import Tube
+from node.firmware.tube_settings import JointRule, MakeUpAngle, TubeSettings
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import forget_session, new_node
@@ -31,7 +31,7 @@ class Bench:
     def __init__(self, rule: JointRule, **change: float) -> None:
         config = default_config()
         limits = SensorLimits(repeats_together=0, repeats_alone=0)
-        self.settings = TubeSettings(3, Joint(0.5, OLD), joints=rule, limits=limits, **change)  # type: ignore[arg-type]
+        self.settings = TubeSettings(3, MakeUpAngle(0.5, OLD), joints=rule, limits=limits, **change)  # type: ignore[arg-type]
         self.tube = Tube(self.settings, config, new_node(config), iter(range(1, 10**6)).__next__, restored=False)
         self.now = 1000.0
         self.events: dict[str, Event] = {}

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from node.kernels.arithmetic import circular as c
 from node.kernels.arithmetic import operations as n
-from node.kernels.arithmetic.angles import wrap, wrap_positive
+from node.kernels.arithmetic.angles import wrap_angle, wrap_positive
 from node.kernels.arithmetic.formats import (
     ANGLE_Q,
     FORCE_PART,
@@ -37,20 +37,20 @@ from node.kernels.arithmetic.quantity import (
     NONE,
     ONE,
     Constant,
-    angle,
-    factor,
-    force,
-    rate,
-    rate_variance,
-    seconds,
-    variance,
-    warmth,
+    angle_quantity,
+    factor_quantity,
+    force_quantity,
+    rate_quantity,
+    rate_variance_quantity,
+    temperature_quantity,
+    time_quantity,
+    variance_quantity,
 )
-from node.kernels.record.events import TOLD_Q, told_degrees
-from node.kernels.sensors.aligner import inward, longest, tilt_of
-from node.kernels.sensors.static_average import added, fine, joint, without_one
+from node.kernels.record.events import TOLD_Q, event_degrees
+from node.kernels.sensors.aligner import centripetal_force, tilt_of, turning_time_limit
+from node.kernels.sensors.static_average import bounded_sum, deviation_product, force_for_mean, without_one
 from node.kernels.sensors.sweep import angle_square, fine_product
-from node.kernels.string.twist import wound
+from node.kernels.string.twist import twist_angle
 
 Q = {"time": TIME_Q, "rate": RATE_Q, "angle": ANGLE_Q, "force": FORCE_Q, "var": VAR_Q, "factor": VECTOR_Q}
 Q |= {"torque": TORQUE_Q, "stiffness": STIFFNESS_Q, "weight": WEIGHT_Q, "stamp": VAR_Q + 12, "told": TOLD_Q}
@@ -68,65 +68,71 @@ def calling(operation: Callable[..., Any], arguments: int) -> Callable[..., Any]
 # what is computed; of each argument what it is and from where to where; what comes out, and how far off it may be:
 # relative, and in counts
 CASES: dict[str, tuple[Callable[..., Any], list[tuple[str, float, float]], str, float, float]] = {
-    "times": (n.times, [("rate", -32, 32), ("factor", -2, 2)], "rate", 0.0, 2),
-    "times a variance": (n.times, [("var", 0, 12), ("factor", -2, 2)], "var", 0.0, 2),
-    "over": (n.over, [("rate", -32, 32), ("factor", 0.25, 2)], "rate", 2e-9, 4),
-    "ratio": (n.ratio, [("var", 0, 12), ("var", 1e-8, 12)], "factor", 3e-9, 20),
-    "fraction": (n.fraction, [("angle", 0, 4), ("angle", 3, 6)], "factor", 3e-9, 2),
+    "times": (n.times_factor, [("rate", -32, 32), ("factor", -2, 2)], "rate", 0.0, 2),
+    "times a variance": (n.times_factor, [("var", 0, 12), ("factor", -2, 2)], "var", 0.0, 2),
+    "over": (n.over_factor, [("rate", -32, 32), ("factor", 0.25, 2)], "rate", 2e-9, 4),
+    "ratio": (n.quantity_ratio, [("var", 0, 12), ("var", 1e-8, 12)], "factor", 3e-9, 20),
+    "fraction": (n.bounded_ratio, [("angle", 0, 4), ("angle", 3, 6)], "factor", 3e-9, 2),
     "share": (
-        n.share,
+        n.proportional_share,
         [("rate", -32, 32), ("time", -0.6, 0.6), ("time", 0.3, 5)],
         "rate",
         1e-8,
         2.0**25,
     ),
-    "turn": (n.turn, [("rate", -32, 32), ("time", -4096, 4096)], "angle", 3e-7, 64),
-    "turn of a cycle": (n.turn, [("rate", -32, 32), ("time", -8, 8)], "angle", 0.0, 2),
-    "speed": (n.speed, [("angle", -1, 1), ("time", 1e-3, 6)], "rate", 3e-9, 40000),
-    "speed of a large angle": (n.speed, [("angle", -4, 4), ("time", 4e-3, 6)], "rate", 3e-9, 40000),
-    "square": (n.square, [("angle", -4, 4)], "var", 0.0, 2.0**31),
-    "product": (n.product, [("angle", -4, 4), ("angle", -4, 4)], "var", 0.0, 2.0**31),
-    "root": (n.root, [("var", 0, 16)], "angle", 5e-9, 2),
+    "turn": (n.turned_angle, [("rate", -32, 32), ("time", -4096, 4096)], "angle", 3e-7, 64),
+    "turn of a cycle": (n.turned_angle, [("rate", -32, 32), ("time", -8, 8)], "angle", 0.0, 2),
+    "speed": (n.turning_rate, [("angle", -1, 1), ("time", 1e-3, 6)], "rate", 3e-9, 40000),
+    "speed of a large angle": (n.turning_rate, [("angle", -4, 4), ("time", 4e-3, 6)], "rate", 3e-9, 40000),
+    "square": (n.angular_square, [("angle", -4, 4)], "var", 0.0, 2.0**31),
+    "product": (n.angular_product, [("angle", -4, 4), ("angle", -4, 4)], "var", 0.0, 2.0**31),
+    "root": (n.angular_root, [("var", 0, 16)], "angle", 5e-9, 2),
     "time_root": (n.time_root, [("var", 0, 16)], "time", 5e-9, 2),
-    "half": (n.half, [("angle", -100, 100)], "angle", 0.0, 1),
+    "half": (n.half_of, [("angle", -100, 100)], "angle", 0.0, 1),
     "length": (
-        n.length,
+        n.vector_length,
         [("force", -32, 32), ("force", -32, 32), ("force", -32, 32)],
         "force",
         5e-9,
         20,
     ),
-    "scaled": (n.scaled, [("rate", -32, 32), ("rate", -0.5, 0.5)], "rate", 0.0, 600_000),
-    "unscaled": (n.unscaled, [("rate", -32, 32), ("rate", -0.5, 0.5)], "rate", 5e-9, 4),
+    "scaled": (n.indicated_rate, [("rate", -32, 32), ("rate", -0.5, 0.5)], "rate", 0.0, 600_000),
+    "unscaled": (n.true_rate, [("rate", -32, 32), ("rate", -0.5, 0.5)], "rate", 5e-9, 4),
     "stamp_square": (n.stamp_square, [("time", 0, 0.05)], "stamp", 0.0, 2.0**38),
     "scale_square": (n.scale_square, [("factor", 0, 0.05)], "stamp", 0.0, 2.0**35),
-    "wound": (wound, [("torque", 0, 1e6), ("stiffness", 1e3, 1e9)], "angle", 3e-9, 1100),
+    "wound": (twist_angle, [("torque", 0, 1e6), ("stiffness", 1e3, 1e9)], "angle", 3e-9, 1100),
     "cosine": (lambda a: c.spin_of(a)[0], [("angle", -130, 130)], "factor", 0.0, 60),
     "sine": (lambda a: c.spin_of(a)[1], [("angle", -130, 130)], "factor", 0.0, 60),
     "arcsine": (c.arcsine, [("factor", -0.99, 0.99)], "angle", 0.0, 10000),
     "arctangent": (c.arctangent, [("factor", -1, 1), ("factor", 0.01, 1)], "angle", 0.0, 4),
     "arctangent behind": (c.arctangent, [("factor", 0.01, 1), ("factor", -1, 1)], "angle", 0.0, 4),
-    "reach": (c.reach, [("factor", -2, 2), ("factor", -2, 2)], "factor", 5e-9, 20),
+    "reach": (c.planar_length, [("factor", -2, 2), ("factor", -2, 2)], "factor", 5e-9, 20),
     "angle_of_turns": (c.angle_of_turns, [("turns", 0, 128)], "angle", 1e-9, 1),
     "turns_of": (c.turns_of, [("angle", 0, 1000)], "turns", 1e-9, 1),
-    "longest": (longest, [("turns", 0, 128)], "time", 1e-6, 2),
-    "inward": (inward, [("rate", -0.262, 0.262), ("factor", -2, 2)], "force", 0.0, 4),
+    "longest": (turning_time_limit, [("turns", 0, 128)], "time", 1e-6, 2),
+    "inward": (centripetal_force, [("rate", -0.262, 0.262), ("factor", -2, 2)], "force", 0.0, 4),
     "tilt_of": (tilt_of, [("angle", 0, 1), ("weight", 0, 128)], "angle", 0.0, 200),
     "angle_square": (angle_square, [("angle", -127, 127)], "squares", 1e-6, 4),
     "fine_product": (fine_product, [("factor", -1, 1), ("factor", -1, 1)], "fine", 0.0, 1),
-    "joint": (lambda a, b: joint(a, b, 50), [("rate", -16, 16), ("rate", -16, 16)], "joint", 2e-9, 600),
+    "joint": (lambda a, b: deviation_product(a, b, 50), [("rate", -16, 16), ("rate", -16, 16)], "joint", 2e-9, 600),
     "joint of rate and force": (
-        lambda a, b: joint(a, b, 47),
+        lambda a, b: deviation_product(a, b, 47),
         [("rate", -16, 16), ("mean", -16, 16)],
         "mixed",
         2e-9,
         600,
     ),
-    "added": (added, [("joint", -256, 256), ("joint", -256, 256)], "joint", 0.0, 64),  # the float has 53 bits of 59
-    "fine force": (fine, [("force", -32, 32)], "mean", 0.0, 0),
+    "added": (
+        bounded_sum,
+        [("joint", -256, 256), ("joint", -256, 256)],
+        "joint",
+        0.0,
+        64,
+    ),  # the float has 53 bits of 59
+    "fine force": (force_for_mean, [("force", -32, 32)], "mean", 0.0, 0),
     "all but one": (lambda a: without_one(a, 7000), [("mean", -64, 64)], "mean", 0.0, 1),
-    "degrees": (lambda a: told_degrees(a, ANGLE_Q), [("angle", -1000, 1000)], "told", 1e-8, 1),
-    "wrap": (wrap, [("angle", -1000, 1000)], "angle", 0.0, 400),
+    "degrees": (lambda a: event_degrees(a, ANGLE_Q), [("angle", -1000, 1000)], "told", 1e-8, 1),
+    "wrap": (wrap_angle, [("angle", -1000, 1000)], "angle", 0.0, 400),
     "wrap_positive": (wrap_positive, [("angle", -1000, 1000)], "angle", 0.0, 400),
     "a binary angle": (lambda a: n.offset_angle(n.kept_angle(a)), [("angle", -3.1, 3.1)], "angle", 0.0, 2000),
 }
@@ -184,14 +190,14 @@ def test_a_constant_takes_the_form_of_what_it_meets() -> None:
 @pytest.mark.parametrize(
     ("constant", "q", "unit"),
     [
-        (seconds(3.0), TIME_Q, 1.0),
-        (rate(-0.1), RATE_Q, 1.0),
-        (angle(math.pi), ANGLE_Q, 1.0),
-        (force(0.3), FORCE_Q, 9.80665),
-        (variance(10.0), VAR_Q, 1.0),
-        (rate_variance(1e-6), VAR_Q, 2.0**-12),
-        (factor(0.999), VECTOR_Q, 1.0),
-        (warmth(25.0), VECTOR_Q, 128.0),
+        (time_quantity(3.0), TIME_Q, 1.0),
+        (rate_quantity(-0.1), RATE_Q, 1.0),
+        (angle_quantity(math.pi), ANGLE_Q, 1.0),
+        (force_quantity(0.3), FORCE_Q, 9.80665),
+        (variance_quantity(10.0), VAR_Q, 1.0),
+        (rate_variance_quantity(1e-6), VAR_Q, 2.0**-12),
+        (factor_quantity(0.999), VECTOR_Q, 1.0),
+        (temperature_quantity(25.0), VECTOR_Q, 128.0),
     ],
 )
 def test_a_constant_is_a_float_that_knows_its_integer(constant: Constant, q: int, unit: float) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from node.firmware.settings import TubeSettings
+from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import PERIOD
 from node.process.drivers.timed import TimedImu
 from node.process.tube_process import TubeProcess

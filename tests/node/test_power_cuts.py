@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from node.firmware.saved_state import FIELDS, layout_name, pack
-from node.firmware.settings import TubeSettings
+from node.firmware.saved_state import FIELDS, layout_name, pack_state_slot
+from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import NODE_LAYOUT, new_node
@@ -133,7 +133,7 @@ def fill(folder: Path, newest: int, earlier: int, random: np.random.Generator) -
     folder.mkdir()
     for age in range(earlier, -1, -1):
         generation, blob = 1000 - age, random.bytes(int(random.integers(0, 3000)))
-        (folder / f"slot-{(newest - age) % SLOTS}").write_bytes(pack(marked(generation), blob, generation))
+        (folder / f"slot-{(newest - age) % SLOTS}").write_bytes(pack_state_slot(marked(generation), blob, generation))
     return generation, blob
 
 
@@ -151,7 +151,7 @@ def test_a_cut_at_any_instant_leaves_the_old_or_the_new_node(
         for life in range(int(random.integers(1, 4))):
             wanted = (100 + life, random.bytes(int(random.integers(0, 3000))))
             disk = Disk(folder, random)
-            total = len(pack(marked(0), wanted[1], 0)) + 8 * BOUNDARY
+            total = len(pack_state_slot(marked(0), wanted[1], 0)) + 8 * BOUNDARY
             disk.left = float(random.integers(0, total + BOUNDARY))
             survivor = Journal(folder)
             loaded = survivor.load()
@@ -243,7 +243,7 @@ def other_fields(slot: bytes) -> bytes:
 
 
 def before_checksums(version: int) -> Callable[[bytes], bytes]:
-    """The header of before, with the version alone: magic, version, 0, generation, bytes of state and blob."""
+    """The earlier header, with the version alone: magic, version, 0, generation, bytes of state and blob."""
 
     def slot_of(slot: bytes) -> bytes:
         state, blob = bytes(4096), b"blob"

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import RING, Err, default_config
 from node.kernels.record.node_record import AIDINGS, MISMATCH, new_node
-from node.kernels.turns.aiding_watch import AT_ONCE, AT_REST, STARTING, find_mismatch, forget
+from node.kernels.turns.aiding_watch import AT_ONCE, AT_REST, STARTING, find_mismatch, reset_aiding_watch
 from node.kernels.turns.ramps import LONGEST, REACH, follow_fit, follow_ramp, is_starting
 from node.kernels.turns.ramps import STARTING as LONGEST_START
 
@@ -140,7 +140,7 @@ def test_an_angle_turned_back_opens_the_yaw_by_the_asymmetry(back_deg: float) ->
 ])  # fmt: skip
 def test_what_may_be_a_winding_string_is_looked_at_for_longer(patience: int, size_dps: float, wanted: int) -> None:
     watch, found = np.zeros(1, AIDINGS)[0], np.zeros(1, MISMATCH)[0]
-    forget(watch)
+    reset_aiding_watch(watch)
     innovation = 0.0
     seen = []
     for k in range(8):

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node.errors import SavedStateError
-from node.firmware.saved_state import description, layout_name, pack, resume, unpack
+from node.firmware.saved_state import dtype_description, layout_name, pack_state_slot, resume_node, unpack_state_slot
 from node.kernels.arithmetic.formats import DEG
 from node.kernels.record.filter_record import Err, default_config
 from node.kernels.record.node_record import KEPT_SIZE, new_node
@@ -26,25 +26,25 @@ def state(yaw: int) -> np.ndarray:
 
 @given(st.binary(max_size=300), st.integers(0, 2**60))
 def test_a_slot_gives_back_what_was_packed(blob: bytes, generation: int) -> None:
-    got = unpack(pack(state(7), blob, generation))
+    got = unpack_state_slot(pack_state_slot(state(7), blob, generation))
     assert got.nodes.tobytes()[:KEPT_SIZE] == state(7).tobytes()[:KEPT_SIZE]
-    resume(got.nodes, default_config())
+    resume_node(got.nodes, default_config())
     wanted = state(7)
-    resume(wanted, default_config())
+    resume_node(wanted, default_config())
     assert got.nodes.tobytes() == wanted.tobytes(), "what is not saved a start makes anew"
     assert (got.blob, got.generation) == (blob, generation)
 
 
 @given(st.binary(max_size=300))
 def test_what_a_longer_save_left_behind_a_slot_is_not_looked_at(rest: bytes) -> None:
-    got = unpack(pack(state(7), b"blob", 3) + rest)
+    got = unpack_state_slot(pack_state_slot(state(7), b"blob", 3) + rest)
     assert (got.nodes.tobytes()[:KEPT_SIZE], got.blob) == (state(7).tobytes()[:KEPT_SIZE], b"blob")
 
 
 def test_a_slot_says_when_it_was_saved() -> None:
     made = state(7)
     made["filter"]["now"] = 1234.5
-    assert unpack(pack(made, b"", 1)).saved_at == 1234.5
+    assert unpack_state_slot(pack_state_slot(made, b"", 1)).saved_at == 1234.5
 
 
 def test_every_layout_of_the_record_has_its_version() -> None:
@@ -66,24 +66,24 @@ def test_every_layout_of_the_record_has_its_version() -> None:
 def test_a_description_tells_layouts_of_one_size_apart(other: list[tuple[str, str]]) -> None:
     one = np.dtype([("a", "f8"), ("b", "i8")], align=True)
     assert np.dtype(other).itemsize == one.itemsize
-    assert description(one) == "{a@0:<f8,b@8:<i8}16"
-    assert description(np.dtype(other)) != description(one)
+    assert dtype_description(one) == "{a@0:<f8,b@8:<i8}16"
+    assert dtype_description(np.dtype(other)) != dtype_description(one)
 
 
 @given(st.data())
 def test_any_damage_to_a_slot_is_seen(data: st.DataObject) -> None:
-    slot = bytearray(pack(state(7), b"blob", 3))
+    slot = bytearray(pack_state_slot(state(7), b"blob", 3))
     at = data.draw(st.integers(0, len(slot) - 1))
     slot[at] ^= data.draw(st.integers(1, 255))
     with pytest.raises(SavedStateError):
-        unpack(bytes(slot))
+        unpack_state_slot(bytes(slot))
 
 
 @given(st.data())
 def test_any_torn_slot_is_seen(data: st.DataObject) -> None:
-    slot = pack(state(7), b"blob", 3)
+    slot = pack_state_slot(state(7), b"blob", 3)
     with pytest.raises(SavedStateError):
-        unpack(slot[: data.draw(st.integers(0, len(slot) - 1))])
+        unpack_state_slot(slot[: data.draw(st.integers(0, len(slot) - 1))])
 
 
 def test_the_newest_good_slot_wins_wherever_the_writing_was_cut(tmp_path: Path) -> None:
@@ -92,7 +92,7 @@ def test_the_newest_good_slot_wins_wherever_the_writing_was_cut(tmp_path: Path) 
     journal.save(state(1), b"one")
     journal.save(state(2), b"two")
     slots = [(tmp_path / f"slot-{k}").read_bytes() for k in (0, 1)]
-    third = pack(state(3), b"three", 3)
+    third = pack_state_slot(state(3), b"three", 3)
     for cut in range(0, len(third), 97):
         (tmp_path / "slot-0").write_bytes(third[:cut])  # the third save goes over the first
         found = Journal(tmp_path, 2).load()
@@ -131,7 +131,7 @@ def test_a_node_that_turned_keeps_its_constants_and_doubts_its_attitude() -> Non
     saved = state(12345)
     saved[0]["filter"]["P"][Err.YAW, Err.YAW] = (0.01 * DEG) ** 2
     saved[0]["filter"]["still_cycles"] = 0
-    resume(saved, default_config())
+    resume_node(saved, default_config())
     assert int(saved[0]["filter"]["yaw"]) == 12345
     assert saved[0]["filter"]["P"][Err.YAW, Err.YAW] == pytest.approx(math.pi**2 / 3.0, rel=1e-3)
     assert np.diagonal(saved[0]["filter"]["P"])[[Err.TILT_X, Err.TILT_Y]].tolist() == [1.0, 1.0]
@@ -142,7 +142,7 @@ def test_a_node_that_stood_still_keeps_its_yaw_and_its_trust() -> None:
     saved = state(12345)
     saved[0]["filter"]["P"][Err.YAW, Err.YAW] = (0.01 * DEG) ** 2
     saved[0]["filter"]["still_cycles"] = 40
-    resume(saved, default_config())
+    resume_node(saved, default_config())
     assert saved[0]["filter"]["P"][Err.YAW, Err.YAW] == (0.01 * DEG) ** 2
 
 

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from string_of_one import Sample, Spoil, StringOfOne
 
-from node.errors import ConfigurationError
+from node.errors import NodeConfigurationError
 from node.firmware.sensor_limits import SensorLimits
-from node.firmware.settings import TubeSettings, crew_record
+from node.firmware.tube_settings import TubeSettings, settings_record
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.record.events import Fault
 from node.kernels.record.filter_record import Err, default_config
 from node.kernels.record.node_record import AIDINGS, MISMATCH, new_node
 from node.kernels.sensors.sensor_watch import find_faults
-from node.kernels.turns.aiding_watch import AT_ONCE, find_mismatch, forget
-from node.kernels.turns.gates import contradicts
+from node.kernels.turns.aiding_watch import AT_ONCE, find_mismatch, reset_aiding_watch
+from node.kernels.turns.gates import contradicts_gyroscope
 from telemetry.messages import Mode, NodeFlag
 
 FLAGGED_WITHIN = 10  # cycles
@@ -153,7 +153,7 @@ def test_a_new_scale_is_named_and_learnt(factor: float, healthy: StringOfOne) ->
 def test_what_the_encoder_jumped_by_before_a_gyroscope_was_found_stuck_stays_in_doubt(
     slipped_deg: float, healthy: StringOfOne
 ) -> None:
-    """The readings of before are all that contradicts it; afterwards the node takes the yaw that it is given."""
+    """Earlier readings are all that contradicts it; afterwards the node takes the yaw that it is given."""
     at = healthy.resting(1)
     jump = {"jump_deg": slipped_deg, "jump_s": (at + 1) * PERIOD}
     string = StringOfOne(1, stick(at + 2, (0, 1, 2)), rough={"encoder": jump}).advance(at + LASTS + SETTLED)
@@ -283,7 +283,7 @@ class Watched:
 
     def __init__(self) -> None:
         self.watch, self.found = np.zeros(1, AIDINGS)[0], np.zeros(1, MISMATCH)[0]
-        forget(self.watch)
+        reset_aiding_watch(self.watch)
 
     def takes(self, innovation: float, spin: float, now: float, *, rejected: bool = True) -> Fault:
         find_mismatch(self.watch, self.found, innovation, 1e-4, spin, now, int(rejected), 0, AT_ONCE)
@@ -304,7 +304,7 @@ def test_a_bias_that_grows_the_innovation_is_a_step_and_one_with_the_rate_a_scal
     assert found == [Fault.NONE, Fault.NONE, Fault.GYRO_STEP]
     assert float(watched.found["rate"]) == pytest.approx(0.02)
     assert watched.found["steady"]
-    forget(watched.watch)
+    reset_aiding_watch(watched.watch)
     watched.takes(0.0, 0.0, 0.5, rejected=False)
     spins, innovation = (0.2, 0.6, 1.0), 0.0
     for k, spin in enumerate(spins):
@@ -346,11 +346,11 @@ def test_a_growth_over_half_a_turn_is_that_of_the_shorter_way() -> None:
 
 def test_one_knock_is_no_fault_of_the_accelerometer() -> None:
     limits = SensorLimits()
-    crew = crew_record(TubeSettings(1, limits=limits), default_config())[0]
+    record = settings_record(TubeSettings(1, limits=limits), default_config())[0]
     watch = new_node(default_config())[0]["guard"]["readings"]
 
     def faults(rate: list[float], force: list[float], saturated: int = 0) -> tuple[int, int]:
-        return find_faults(watch, crew, np.array(rate), np.array(force), saturated)
+        return find_faults(watch, record, np.array(rate), np.array(force), saturated)
 
     limit = limits.force_range
     rates = [[1e-4 * k, 2e-4 * k, 3e-4 * k] for k in range(9)]
@@ -365,7 +365,7 @@ def test_one_knock_is_no_fault_of_the_accelerometer() -> None:
     "change", [{"rate_range": 0.0}, {"force_range": math.nan}, {"repeats_alone": -1}, {"repeats_together": -1}]
 )
 def test_limits_that_cannot_be_are_refused_by_name(change: dict) -> None:
-    with pytest.raises(ConfigurationError, match=next(iter(change))):
+    with pytest.raises(NodeConfigurationError, match=next(iter(change))):
         SensorLimits(**change)
 
 
@@ -383,4 +383,4 @@ def test_a_reference_at_rest_is_judged_anew_by_a_node_that_turned_unaided(
     state["yaw_known"], state["mode"], state["still_cycles"] = 1, int(Mode.STILL), 10
     state["now"], state["last_aided"], state["stopped_at"] = 60.0, 30.0, stopped_at
     state["now_P"][Err.YAW, Err.YAW] = (0.03 * DEG) ** 2
-    assert bool(contradicts.py_func(node, off_deg * DEG, 60.0)) == judged
+    assert bool(contradicts_gyroscope.py_func(node, off_deg * DEG, 60.0)) == judged

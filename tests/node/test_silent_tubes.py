@@ -6,15 +6,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from node.errors import ConfigurationError
-from node.firmware.settings import MAX_REACH, Joint, PassedTube, TubeSettings
-from node.firmware.silent_tubes import across
+from node.errors import NodeConfigurationError
+from node.firmware.silent_tubes import aiding_across_silent
 from node.firmware.tube import Tube
+from node.firmware.tube_settings import MAX_REACH, MakeUpAngle, PassedTube, TubeSettings
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import new_node
 from telemetry.messages import Aiding
 
-JOINTS = st.builds(Joint, st.floats(-math.pi, math.pi), st.floats(0.0, 0.01))
+JOINTS = st.builds(MakeUpAngle, st.floats(-math.pi, math.pi), st.floats(0.0, 0.01))
 PASSED = st.builds(PassedTube, JOINTS, JOINTS)
 STIFFNESS = 2e4  # N m/rad
 
@@ -38,9 +38,9 @@ def aidings(draw: st.DrawFn) -> Aiding:
 
 def through(aiding: Aiding, number: int, passed: PassedTube) -> Aiding:
     """What a living tube hands down of an aiding."""
-    crew = TubeSettings(number, drive_joint=passed.drive_joint, lower_joint=passed.lower_joint, stiffness=STIFFNESS)
+    settings = TubeSettings(number, drive_joint=passed.drive_joint, lower_joint=passed.lower_joint, stiffness=STIFFNESS)
     config = default_config()
-    tube = Tube(crew, config, new_node(config), lambda: 1, restored=False)
+    tube = Tube(settings, config, new_node(config), lambda: 1, restored=False)
     onward = tube.on_aiding(aiding, aiding.valid_at)
     assert onward is not None
     return onward
@@ -49,7 +49,7 @@ def through(aiding: Aiding, number: int, passed: PassedTube) -> Aiding:
 @settings(max_examples=30)
 @given(aidings(), st.lists(PASSED, max_size=3))
 def test_over_silent_tubes_comes_what_comes_through_living_ones(aiding: Aiding, silent: list[PassedTube]) -> None:
-    over = across(aiding, silent, STIFFNESS)
+    over = aiding_across_silent(aiding, silent, STIFFNESS)
     living = aiding
     for number, passed in enumerate(reversed(silent)):
         living = through(living, 9 - number, passed)
@@ -63,5 +63,5 @@ def test_over_silent_tubes_comes_what_comes_through_living_ones(aiding: Aiding, 
 
 @pytest.mark.parametrize("reach", [0, MAX_REACH + 1])
 def test_a_reach_that_no_node_has_is_refused(reach: int) -> None:
-    with pytest.raises(ConfigurationError, match=f"reach: expected 1..{MAX_REACH} tubes, got {reach}"):
+    with pytest.raises(NodeConfigurationError, match=f"reach: expected 1..{MAX_REACH} tubes, got {reach}"):
         TubeSettings(1, reach=reach)

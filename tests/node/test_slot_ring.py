@@ -79,8 +79,10 @@ def flash(monkeypatch: pytest.MonkeyPatch) -> Flash:
     """A disk that holds nothing but the number of each save."""
     made = Flash()
     monkeypatch.setattr(disk_module, "os", made)
-    monkeypatch.setattr(journal_module, "pack", lambda state, blob, generation: generation.to_bytes(NUMBER, "little"))
-    monkeypatch.setattr(journal_module, "unpack", unpacked)
+    monkeypatch.setattr(
+        journal_module, "pack_state_slot", lambda state, blob, generation: generation.to_bytes(NUMBER, "little")
+    )
+    monkeypatch.setattr(journal_module, "unpack_state_slot", unpacked)
     return made
 
 

@@ -10,14 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from string_of_one import Sample, StringOfOne
 
-from node.kernels.arithmetic.angles import from_binary, wrap
+from node.kernels.arithmetic.angles import from_binary, wrap_angle
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.filter.covariance import set_apart
-from node.kernels.filter.float64.propagation import propagate
-from node.kernels.filter.float64.update import correct, innovation_var
+from node.kernels.filter.float64.propagation import propagate_covariance
+from node.kernels.filter.float64.update import correct_states, innovation_var
 from node.kernels.filter.revision import follow_revision, open_revision
-from node.kernels.filter.smoothing import begin_smoothing, carry
-from node.kernels.record.filter_record import STATES, Err, Status, default_config, new_state
+from node.kernels.filter.smoothing import begin_smoothing, propagate_survey_covariance
+from node.kernels.record.filter_record import STATES, CycleStatus, Err, default_config, new_state
 from node.kernels.record.node_record import SETTINGS, new_node
 from sim.rig.direct_string import Survey
 from sim.studies.scenarios import on_off
@@ -55,8 +55,8 @@ def test_it_is_a_filter_with_one_state_more(seed: int) -> None:
         wz, step = float(random.uniform(-1.3, 1.3)), np.eye(STATES + 1)
         step[:STATES, :STATES] = transition(wz, PERIOD, config[0])
         whole = step @ whole @ step.T
-        propagate(state["P"], wz, PERIOD, 1.0, config[0])
-        carry(state, wz, PERIOD, 1.0, config[0])
+        propagate_covariance(state["P"], wz, PERIOD, 1.0, config[0])
+        propagate_survey_covariance(state, wz, PERIOD, 1.0, config[0])
         row = np.append(random.normal(0.0, 1.0, STATES), 0.0)
         variance, residual = float(random.uniform(1e-5, 1e-3)), float(random.normal(0.0, 1e-3))
         spread = row @ whole @ row + variance
@@ -64,10 +64,10 @@ def test_it_is_a_filter_with_one_state_more(seed: int) -> None:
         whole -= spread * np.outer(gain, gain)
         moved += gain[STATES] * residual
         state["h"] = row[:STATES]
-        correct(state, innovation_var(state["P"], state["h"], variance, state["ph"]), residual)
+        correct_states(state, innovation_var(state["P"], state["h"], variance, state["ph"]), residual)
     assert state["surveyed_var"] == pytest.approx(whole[STATES, STATES], rel=1e-6)
     assert state["surveyed_with"] == pytest.approx(whole[STATES, :STATES], rel=1e-6, abs=1e-12)
-    assert wrap(from_binary(state["surveyed_yaw"])) == pytest.approx(moved, abs=1e-8)
+    assert wrap_angle(from_binary(state["surveyed_yaw"])) == pytest.approx(moved, abs=1e-8)
 
 
 @pytest.mark.parametrize("error", list(Err))
@@ -131,7 +131,7 @@ def test_integers_say_the_same() -> None:
     said = [last_words(string) for string in (floats, integers)]
     assert len(said[0]) == len(said[1]) > 0
     for (_, one), (_, other) in zip(*said, strict=True):
-        assert wrap(other.measurement.yaw - one.measurement.yaw) == pytest.approx(0.0, abs=math.radians(1e-3))
+        assert wrap_angle(other.measurement.yaw - one.measurement.yaw) == pytest.approx(0.0, abs=math.radians(1e-3))
         assert other.measurement.yaw_var == pytest.approx(one.measurement.yaw_var, rel=1e-2)
 
 
@@ -146,7 +146,7 @@ class Surveyed:
         self.state["yaw_known"], self.state["still_cycles"] = 1, 40
         open_revision(self.node, self.settings[0])
 
-    def follows(self, var: float, status: Status = Status.NONE) -> bool:
+    def follows(self, var: float, status: CycleStatus = CycleStatus.NONE) -> bool:
         self.state["surveyed_var"] = var
         return bool(follow_revision(self.node, int(status)))
 
@@ -157,8 +157,8 @@ def test_half_of_the_variance_is_worth_a_message_and_then_half_of_that() -> None
     assert said == [False, False, True, False, False, True, False]
 
 
-@pytest.mark.parametrize("status", [Status.YAW_RESET, Status.FILTER_FAULT])
-def test_what_contradicts_the_yaw_ends_it(status: Status) -> None:
+@pytest.mark.parametrize("status", [CycleStatus.YAW_RESET, CycleStatus.FILTER_FAULT])
+def test_what_contradicts_the_yaw_ends_it(status: CycleStatus) -> None:
     surveyed = Surveyed()
     assert not surveyed.follows(0.1, status)
     assert not surveyed.follows(0.1)
@@ -166,7 +166,7 @@ def test_what_contradicts_the_yaw_ends_it(status: Status) -> None:
 
 def test_another_reference_is_the_last_word() -> None:
     surveyed = Surveyed()
-    assert surveyed.follows(0.7, Status.REFERENCE_CHANGED)
+    assert surveyed.follows(0.7, CycleStatus.REFERENCE_CHANGED)
     assert not surveyed.follows(0.1)
 
 
@@ -187,9 +187,8 @@ def test_a_twist_that_came_since_counts() -> None:
     assert surveyed.node["revision"]["systematic"] == 0.5
 
 
-@pytest.mark.parametrize(("name", "value"), [("scheme", 1), ("as_published", 1)])
-def test_only_our_form_of_the_encoders_measurement_is_smoothed(name: str, value: int) -> None:
+def test_only_the_encoders_measurement_is_smoothed() -> None:
     surveyed = Surveyed()
-    surveyed.settings[name] = value
+    surveyed.settings["scheme"] = 1
     open_revision(surveyed.node, surveyed.settings[0])
     assert not surveyed.follows(0.1)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
-from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
+from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import new_node

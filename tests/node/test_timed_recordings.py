@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from node.errors import ConfigurationError, SensorError
+from node.errors import NodeConfigurationError, SensorError
 from node.process.drivers.choice import encoder_source, imu_source
 from node.process.drivers.timed import TimedEncoder, TimedImu
 
@@ -73,5 +73,5 @@ def test_rows_that_cannot_be_are_named(tmp_path: Path, row: int, column: int, va
 @pytest.mark.parametrize("kind", ["replay", "timed"])
 def test_a_recording_that_is_not_there_is_refused_before_anything_starts(tmp_path: Path, kind: str) -> None:
     for source in (imu_source, encoder_source):
-        with pytest.raises(ConfigurationError, match=r"expected a recording, got .*none\.npy, which is not a file"):
+        with pytest.raises(NodeConfigurationError, match=r"expected a recording, got .*none\.npy, which is not a file"):
             source(f"{kind}:{tmp_path / 'none.npy'}")

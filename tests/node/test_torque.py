@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.errors import ConfigurationError
-from node.firmware.encoder import EncoderNode, EncoderSample
+from node.errors import NodeConfigurationError
+from node.firmware.encoder_node import EncoderNode, EncoderSample
 from node.firmware.torque import TorqueSettings, drive_record
 from node.kernels.string.drive_torque import follow_torque
 from node.kernels.string.encoder_step import new_encoder
@@ -108,5 +108,5 @@ def test_a_sample_may_bring_the_edges_before_the_last() -> None:
      ("trapped_fraction", math.nan), ("release_cycles", 0)],
 )  # fmt: skip
 def test_settings_of_the_torque_that_cannot_be_are_refused_by_name(name: str, value: float) -> None:
-    with pytest.raises(ConfigurationError, match=f"torque.{name}"):
+    with pytest.raises(NodeConfigurationError, match=f"torque.{name}"):
         TorqueSettings(**{name: value})  # type: ignore[arg-type]

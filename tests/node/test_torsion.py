@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from node.errors import ConfigurationError
+from node.errors import NodeConfigurationError
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
-from node.firmware.settings import Joint, Kernel, TorsionRule, TubeSettings
 from node.firmware.tube import Tube
+from node.firmware.tube_settings import Kernel, MakeUpAngle, TorsionRule, TubeSettings
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Err, Scheme, default_config
 from node.kernels.record.node_record import new_node
@@ -26,8 +26,8 @@ def tube(rule: TorsionRule = "gate", kernel: Kernel = "float64", scheme: Scheme 
     config = default_config()
     settings = TubeSettings(
         3,
-        Joint(0.5, 1e-3),
-        Joint(-0.2, 2e-3),
+        MakeUpAngle(0.5, 1e-3),
+        MakeUpAngle(-0.2, 2e-3),
         scheme=scheme,
         kernel=kernel,
         limits=SensorLimits(repeats_together=0, repeats_alone=0),
@@ -174,5 +174,5 @@ def test_a_rigid_string_tells_of_no_twist() -> None:
      {"joints": "solved", "scheme": Scheme.ESTIMATE}],
 )  # fmt: skip
 def test_settings_that_cannot_be_are_refused_by_name(change: dict) -> None:
-    with pytest.raises(ConfigurationError, match=next(iter(change))):
+    with pytest.raises(NodeConfigurationError, match=next(iter(change))):
         TubeSettings(**({"tube": 1} | change))

@@ -6,17 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from node.errors import ConfigurationError
+from node.errors import NodeConfigurationError
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
-from node.firmware.settings import Joint, TubeSettings
 from node.firmware.tube import Tube
+from node.firmware.tube_settings import MakeUpAngle, TubeSettings
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Scheme, default_config
 from node.kernels.record.node_record import new_node
 from telemetry.messages import Aiding, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
 
-DRIVE, LOWER = Joint(0.5, 1e-3), Joint(-0.2, 2e-3)
+DRIVE, LOWER = MakeUpAngle(0.5, 1e-3), MakeUpAngle(-0.2, 2e-3)
 NOISELESS = SensorLimits(repeats_together=0, repeats_alone=0)
 AIDING = Aiding(1.0, 1e-8, 0.0, 0.0, 0.0, 1000.0, 5, 0)
 
@@ -141,11 +141,11 @@ def test_state_says_what_the_node_does_not_trust() -> None:
 
 @pytest.mark.parametrize(
     "change",
-    [{"tube": 0}, {"tube": 251}, {"state_every": 0}, {"mount_std": -1.0}, {"lower_joint": Joint(math.nan, 0.0)},
-     {"drive_joint": Joint(0.0, math.inf)}],
+    [{"tube": 0}, {"tube": 251}, {"state_every": 0}, {"mount_std": -1.0}, {"lower_joint": MakeUpAngle(math.nan, 0.0)},
+     {"drive_joint": MakeUpAngle(0.0, math.inf)}],
 )  # fmt: skip
 def test_settings_that_cannot_be_are_refused_by_name(change: dict) -> None:
-    with pytest.raises(ConfigurationError, match=next(iter(change))):
+    with pytest.raises(NodeConfigurationError, match=next(iter(change))):
         TubeSettings(**({"tube": 1} | change))
 
 

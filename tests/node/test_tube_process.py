@@ -8,7 +8,7 @@ import msgpack
 import numpy as np
 import pytest
 
-from node.firmware.settings import Joint, TubeSettings
+from node.firmware.tube_settings import MakeUpAngle, TubeSettings
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.record.filter_record import Err
 from node.process.journal import Journal
@@ -67,7 +67,7 @@ def test_no_reading_and_no_frame_ends_the_process(tmp_path: Path, wild: float) -
 
 
 def test_an_aiding_that_grew_beyond_what_can_be_said_is_not_handed_on(tmp_path: Path) -> None:
-    process = TubeProcess(TubeSettings(3, lower_joint=Joint(0.0, 0.1)), tmp_path)
+    process = TubeProcess(TubeSettings(3, lower_joint=MakeUpAngle(0.0, 0.1)), tmp_path)
     process.endpoint.clock = ClockFilter(is_root=True)
     now = cycles(process, 110)
     for var, unsayable in ((1e-4, 0), (VARIANCE, 1)):

@@ -27,7 +27,7 @@ NUMBERS = itertools.count(os.getpid())
 
 
 def free_endpoint() -> str:
-    """An endpoint nobody has, and nobody gets before the rig listens there.
+    """Return a free endpoint, which no other process gets before the rig listens there.
 
     The system never hands out ports of this range by itself, and every worker of the tests looks in its own share.
     """

@@ -30,7 +30,7 @@ COMPILING = 600.0  # s, that a node's kernels may take on a busy machine
 def test_a_process_has_compiled_its_kernels_when_it_says_that_it_lives(
     tmp_path: Path, name: str, words: list[str], kernel: str
 ) -> None:
-    """A stepper takes whoever does not answer a step for 20 s for dead; a cold node compiles for longer."""
+    """A stepper takes a process that does not answer a step for 20 s for dead; a cold node compiles for longer."""
     cache, endpoint = tmp_path / "compiled", free_endpoint()
     lives: queue.SimpleQueue[bool] = queue.SimpleQueue()
     with open_router(endpoint) as bus, contextlib.ExitStack() as stack:

@@ -52,7 +52,7 @@ def services(folder: Path) -> Iterator[tuple[dict[str, Command], str]]:
 
 
 def operator(endpoint: str, keys: Path) -> contextlib.AbstractContextManager[ZenohBus]:
-    """Session of somebody who may look."""
+    """Session with the right to read."""
     return open_client(endpoint, PATIENCE, credentials_of(keys, "operator"))
 
 
@@ -68,7 +68,7 @@ def test_the_services_drill_two_tubes_together_and_end_when_asked(tmp_path: Path
         while ask(bus, "status").get("measurements") != 3:
             ended = {name: p.communicate()[1] for name, p in running.items() if p.poll() is not None}
             assert not ended
-            with contextlib.suppress(queue.Empty):  # whoever asks without a pause keeps all others from a core
+            with contextlib.suppress(queue.Empty):  # asking without a pause keeps all others from a core
                 told.get(timeout=1.0)
         stations = ask(bus, "stations")["stations"]
         assert [s["measurements"] for s in stations] == [2, 1]

@@ -110,7 +110,7 @@ def test_a_ground_station_killed_while_it_collects_goes_on_to_its_blocks(tmp_pat
         os.kill(rig.pid_of("borechain ground"), signal.SIGKILL)
         away = rig.until(lambda: shown()["rig_time_s"]) - gone
         result = rig.result()
-    # the rack goes on meanwhile, by the clock on the wall: an attitude at which nobody orders a record is lost
+    # the rack goes on meanwhile, by the clock on the wall: an attitude without an order of a record is lost
     lost = 1 + int(away / (rack.hold_s + rack.move_s))
     print(f"away for {away:.0f} s of rig time, at most {lost} attitudes lost")
     calibration = result["calibration"]

@@ -1,4 +1,4 @@
-"""The ground station killed at moments by lot: what was receipted is kept, once, over SQLite and over PostgreSQL."""
+"""The ground station killed at random moments: what was receipted is kept, once, over SQLite and over PostgreSQL."""
 
 from pathlib import Path
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from rigs import PATIENCE, free_endpoint, run
 
-from node.firmware.settings import TubeSettings
+from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import PERIOD
 from node.process.drivers.timed import TimedImu
 from node.process.tube_process import TubeProcess

@@ -212,7 +212,7 @@ def test_a_base_station_on_zenoh_hears_a_node_on_can_that_opens_no_session(
 
 
 def test_a_sealed_string_on_can_is_heard_over_tls(tmp_path: Path) -> None:
-    """On the native profile a sealed frame goes by ISO-TP; a base without keys would hear nobody."""
+    """On the native profile a sealed frame goes by ISO-TP; a base without keys would hear no tube."""
     keys, endpoint = tmp_path / "stick", free_endpoint().replace("tcp/", "tls/")
     now = datetime.datetime.now(datetime.UTC)
     init_rig(keys, RIG, now)
@@ -249,7 +249,7 @@ def until(bus: ZenohBus, path: str, fits: Callable[[Any], bool]) -> Any:
         for reply in bus.get(f"borechain/{RIG}/ground/{path}", 10.0):
             if reply.error is None and fits(answer := json.loads(reply.payload)):
                 return answer
-        with contextlib.suppress(queue.Empty):  # whoever asks without a pause keeps the others from a core
+        with contextlib.suppress(queue.Empty):  # asking without a pause keeps the others from a core
             idle.get(timeout=0.05)
     raise TimeoutError(path)
 
@@ -288,7 +288,7 @@ def test_the_crew_is_told_of_a_frozen_node_and_of_an_encoder_that_starts_again(
     string.start_encoder()
     string.start_node()
     until(bus, "nodes/1", lambda node: not node["stale"])
-    until(bus, "status", lambda rig: rig["tubes"] == 1)  # before it is aided nobody knows where in the string it hangs
+    until(bus, "status", lambda rig: rig["tubes"] == 1)  # before it is aided its place in the string is unknown
     string.running["node"].send_signal(signal.SIGSTOP)
     silent = until(bus, "nodes/1", lambda node: node["age_s"] > frozen)
     assert silent["stale"]

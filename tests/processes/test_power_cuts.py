@@ -48,7 +48,7 @@ def test_a_ground_station_that_is_off_across_a_stop_and_an_encoder_cut_lose_no_s
 
 
 def kills(world: World) -> list[KillNode]:
-    """The ground station twenty times, the encoder and each tube twice, at times by lot and apart."""
+    """The ground station twenty times, the encoder and each tube twice, at random times and apart."""
     random = np.random.default_rng(1)
     added = {phase.tube: phase.joint_closed for phase in world.phases if phase.kind == "add"}
     found = []

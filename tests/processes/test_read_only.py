@@ -27,7 +27,7 @@ REFUSAL = refusal_of_name_spaces()
 
 
 def mount(rig: Rig, *words: str | Path) -> None:
-    """Mount something where the rig sees it, and nobody else."""
+    """Mount something where the rig sees it, and no other process."""
     inside = ("nsenter", "--target", str(rig.process.pid), "--user", "--mount", "--preserve-credentials")
     subprocess.run([*inside, *words], check=True, timeout=60.0)
 

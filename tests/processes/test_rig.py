@@ -30,7 +30,7 @@ def drill(folder: Path, *arguments: str) -> dict[str, Any]:
 
 
 def drill_inline(folder: Path, *arguments: str, scenario: Path | str = "rig-3") -> dict[str, Any]:
-    """A rig in one process, which connects to nobody and starts nothing."""
+    """A rig in one process, which connects to nothing and starts nothing."""
     done = run_forked("rig", scenario, "--inline", "--json", "--out", folder / "run", *arguments, timeout=240.0)
     assert done.returncode == 0, done.stderr
     return dict(json.loads(done.stdout.splitlines()[-1]))

@@ -131,7 +131,7 @@ def test_a_recording_that_is_cut_anywhere_is_read_to_the_cut(
 
 
 def test_no_more_than_two_chunks_are_lost_by_a_cut(drilled: tuple[Path, GroundProcess], tmp_path: Path) -> None:
-    """A file that nobody has closed holds all but what the newest chunk gathers."""
+    """A file that was not closed holds all but what the newest chunk gathers."""
     _, ground = drilled
     path = tmp_path / "open.mcap"
     written = 0

@@ -57,6 +57,11 @@ def refusal(scenario: Path, *faults: str) -> str:
         ("[rig]", "[medium]\nlatency_ms = inf\n[rig]", "medium.latency_ms"),
         ("[rig]", "[medium]\nloss = 0.95\n[rig]", "medium.loss"),
         ("[rig]", '[node]\nscheme = "guess"\n[rig]', "node.scheme"),
+        (
+            "[rig]",
+            '[node]\nkernel = "published"\n[rig]',
+            "node.kernel: expected one of float64, fixed, got",
+        ),
         ("[rig]", '[node]\nscheme = "estimate"\njoints = "solved"\n[rig]', "node.joints: expected marks"),
         ("[rig]", '[node]\njoints = "guessed"\n[rig]', "node.joints"),
         ("[rig]", '[node]\ntorsion = "guess"\n[rig]', "node.torsion"),

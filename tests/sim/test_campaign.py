@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from node.firmware.tube import Tube
 from node.kernels.record.node_record import AIDING, MOMENT, READING
-from node.kernels.step.address import firmware
+from node.kernels.step.address import firmware_addresses
 from sim.campaign import engine
 from sim.campaign.chunk import RUNS, Campaign, run_chunk, scenario_digest
 from sim.campaign.draws import draws_of, noise_of, tubes_of
@@ -71,17 +71,19 @@ def test_what_a_rig_gives_its_nodes_gives_the_same_nodes_here_bit_for_bit() -> N
     string.drill()
     rows = np.array(heard.rows, GIVEN)
     assert {CYCLE, HEARD} == set(rows["kind"].tolist())
-    crews, corrections = zip(*((tube._crew, tube._corrections) for tube in string.tubes.values()), strict=True)
+    crews, corrections = zip(
+        *((tube._settings_record, tube._corrections) for tube in string.tubes.values()), strict=True
+    )
     again = before.copy()
     taken = (np.array(heard.readings), np.array(heard.moments), np.array(heard.aidings))
     tables = (np.concatenate(crews), np.stack(corrections))
-    assert replay(*firmware(), again, *tables, rows, *taken) == 0
+    assert replay(*firmware_addresses(), again, *tables, rows, *taken) == 0
     assert same_bits(again, string.nodes)
     assert not same_bits(again, before)
 
 
 def same_bits(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether all fields are the same bit for bit; what lies between two of them is nobody's."""
+    """Whether all fields are the same bit for bit; padding between two of them is ignored."""
     if one.dtype.names is None:
         return one.tobytes() == other.tobytes()
     return all(same_bits(one[name], other[name]) for name in one.dtype.names)
@@ -197,7 +199,7 @@ def test_a_campaign_cut_off_goes_on_and_equals_the_uninterrupted_bit_for_bit(tmp
 
 
 def nothing() -> None:
-    """Nobody looks at the progress."""
+    """Ignore the progress."""
 
 
 def test_a_folder_of_another_campaign_is_refused_by_what_differs(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from node.firmware.settings import JointRule
+from node.firmware.tube_settings import JointRule
 from node.kernels.arithmetic.formats import PERIOD
 from sim.rig.direct_string import DirectString, StringRun
 from sim.world.scenario import scenario_of
@@ -87,7 +87,7 @@ def test_surveys_of_a_string_with_trapped_torque_are_honest(hops: int, rule: str
 
 @pytest.mark.parametrize(("hops", "seeds"), [(10, 6), pytest.param(50, 2, marks=pytest.mark.statistical)])
 def test_a_rig_that_ignores_torsion_says_that_it_cannot_explain_what_it_sees(hops: int, seeds: int) -> None:
-    """The string winds up and unwinds, nobody tells the node of torque: it flags that, and its variance has it."""
+    """The string winds up and unwinds, the node is not told the torque: it flags that, and its variance has it."""
     found = twisted_runs(hops, "ignore", seeds)
     assert nees(found, 1) < 1.7
     for run in found:

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from borechain.drilling.rig_processes import PRELOAD
-from node.firmware.settings import KERNELS
+from node.firmware.tube_settings import KERNELS
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Scheme
 from node.kernels.string.encoder_step import COUNTS_PER_TURN
 from node.process.tube_command import node
 from sim.rig.plain_encoder import LINES, PlainEncoder
-from sim.studies import published_form
 from sim.studies.ingredients import run as ingredients
-from sim.studies.lab import LAB, REST, ROTATING, LabRun, run_seed
+from sim.studies.lab import LAB, REST, ROTATING, LabRun
 from sim.studies.modes import run as modes
+from sim.studies.published_form import published_forms
 from sim.studies.scenarios import Tables, change_sections, on_off
 from sim.studies.trials import rms_deg
 from sim.world.imu_errors import SAMPLE_RATE_HZ, single_samples
@@ -29,7 +29,7 @@ SEEDS = 6
 
 
 def runs(setup: Tables, seeds: int = SEEDS) -> list[LabRun]:
-    return [run_seed((setup, seed)) for seed in range(1, seeds + 1)]
+    return [published_forms.run_published((setup, seed)) for seed in range(1, seeds + 1)]
 
 
 def yaw(found: list[LabRun], window: np.ndarray = REST, hop: int = 0) -> float:
@@ -37,21 +37,21 @@ def yaw(found: list[LabRun], window: np.ndarray = REST, hop: int = 0) -> float:
 
 
 def test_the_published_filter_rests_like_the_thesis_and_diverges_while_it_turns() -> None:
-    found = runs(published_form.setup_of(LAB, "published filter"))
+    found = runs(published_forms.setup_of(LAB, "published filter"))
     assert 0.02 < yaw(found) < 0.1
     assert yaw(found, ROTATING) > 1.0
     assert yaw(runs(LAB), ROTATING) < 0.05
 
 
 def test_the_published_scheme_is_as_far_off_as_it_was_found() -> None:
-    found = runs(published_form.setup_of(LAB, "published scheme"))
+    found = runs(published_forms.setup_of(LAB, "published scheme"))
     low, high = ingredients.STUDIED_DEG["published scheme"]
     assert 0.5 * low < yaw(found) < high
     assert yaw(found) > 5.0 * yaw(runs(LAB))
 
 
 def test_a_published_node_hands_its_own_yaw_down() -> None:
-    two = published_form.setup_of(modes.TWO, "published filter")
+    two = published_forms.setup_of(modes.TWO, "published filter")
     assert two["node"]["scheme"] == Scheme.ESTIMATE.name.lower()
     found = runs(two, 3)
     assert yaw(found, hop=1) < 0.2
@@ -64,7 +64,7 @@ def test_published_rows_stand_beside_the_thesis_and_ours() -> None:
     rows = {(row["case"], row["quantity"]): row for row in result["cases"]}
     for case in modes.CASES["two-nodes"]:
         assert (case.name, "azimuth") in rows
-        for form in published_form.FORMS:
+        for form in published_forms.FORMS:
             row = rows[(f"{case.name}, {form}", "azimuth")]
             assert row["published"] == case.published
             assert row["low"] <= row["ours"] <= row["high"]
@@ -135,12 +135,11 @@ def test_every_kernel_can_be_chosen_and_is_warmed_before_the_first_fork() -> Non
     assert [NodeSection(kernel=kernel).kernel for kernel in KERNELS] == list(KERNELS)
     assert set(PRELOAD) == set(KERNELS)
     program = (
-        "import borechain.drilling.preload_all\n"
+        "import borechain.preload_all\n"
         "from node.kernels.step import node_step as step\n"
         "from node.kernels.step import fixed_step as fixed\n"
-        "from node.kernels.published import step as published\n"
-        "steps = (step.node_step, fixed.fixed_step, published.published_step)\n"
-        "aidings = (step.node_aiding, fixed.fixed_aiding, published.published_aiding)\n"
+        "steps = (step.node_step, fixed.fixed_step)\n"
+        "aidings = (step.node_aiding, fixed.fixed_aiding)\n"
         "print(all(k.signatures for k in steps + aidings))\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

@@ -40,7 +40,7 @@ UP = (
 END_TO_END = (*UP, *DOWN)
 ON_A_JOINT = (*ONE_HOP, *END_TO_END)
 ARRIVED = KEPT_WAIT + 0.5  # s, after which what was said has arrived, though it waited for a state to go up with
-LONG = 12.0  # s, after which what nobody has proven is counted
+LONG = 12.0  # s, after which what is not proven is counted
 FOREIGN = SealKey(b"not of this rig!")
 
 

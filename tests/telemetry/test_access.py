@@ -85,7 +85,7 @@ def wait_until_heard(publisher: Publisher) -> None:
             return
         with contextlib.suppress(queue.Empty):
             idle.get(timeout=0.05)
-    raise AssertionError("nobody listens")
+    raise AssertionError("no listener")
 
 
 def answers(bus: ZenohBus, selector: str) -> list[bytes]:

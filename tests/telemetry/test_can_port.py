@@ -112,7 +112,7 @@ def test_a_bus_that_goes_away_and_comes_back_stops_nobody(stack: contextlib.Exit
 
 
 def test_a_bus_that_goes_away_with_a_frame_stops_nobody(stack: contextlib.ExitStack) -> None:
-    """Nothing tells either end of it: the frame was taken, and nobody acknowledges it any more."""
+    """Nothing tells either end of it: the frame was taken, and it is not acknowledged any more."""
     hub = CanHub()
     serving = threading.Thread(target=hub.serve)
     serving.start()

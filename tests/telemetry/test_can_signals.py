@@ -260,7 +260,7 @@ def test_an_acknowledgement_that_was_lost_is_said_again() -> None:
     carry(upper, lower, ours, theirs, 1.1)
     lower.send_reliable(b"survey")
     assert carry(lower, upper, theirs, ours, 1.2) == [b"survey"]
-    assert [ours.split(frame.payload, 1.3, fd=True).rest for frame in upper.take_frames(1.3)] != []  # nobody hears it
+    assert [ours.split(frame.payload, 1.3, fd=True).rest for frame in upper.take_frames(1.3)] != []  # not heard
     assert carry(lower, upper, theirs, ours, 1.4) == []
     assert lower.waiting == 1
     carry(upper, lower, ours, theirs, 1.5)

@@ -70,7 +70,7 @@ def test_what_a_clock_says_of_its_steps_and_its_drift_accounts_for_all_that_date
         clocks = Clocks(seed)
         clocks.run(60.0 + seed)
         for node in clocks.filters:
-            assert math.isnan(node.take_step())  # before the first exchange nobody knew
+            assert math.isnan(node.take_step())  # unknown before the first exchange
         t = clocks.next[-1] if seed % 2 else 1060.0 + seed
         before = [node.rig_from_local(clocks.local(k, t)) - t for k, node in enumerate(clocks.filters)]
         for k in range(HOPS):

@@ -148,7 +148,7 @@ def is_bounded(string: SealedString) -> None:
 
 
 def works_still(string: SealedString) -> None:
-    """What was made to believe nonsense without keys is itself again once it starts again; under keys nobody was."""
+    """What was made to believe nonsense without keys is itself again after a start; under keys none was."""
     if not string.sealed:
         for address in ORDER:
             string.start(address, new=True)

@@ -2,8 +2,8 @@
 
 The inputs are frames that an encoder and a tube have sent over the joint, in both profiles, classic and FD: their
 identifiers and their data are damaged, cut, lengthened, said again and taken for others. Among them are whole transfers
-of frames of the link whose headers say odd things. One thing alone is left out, that somebody older has the number of
-an end: that end then falls silent, as it must.
+of frames of the link whose headers say odd things. One thing alone is left out: an older controller with the number
+of an end, which then falls silent, as it must.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class Joint:
 
 
 def damaged(lot: random.Random, frame: CanData, other: CanData) -> CanData:
-    """A frame that nobody sent."""
+    """A frame that was never sent."""
     identifier, data = frame
     match lot.randrange(7):
         case 0:
@@ -155,7 +155,7 @@ def fuzz(inputs: int, *, native: bool, largest: int) -> None:
     for endpoint in (joint.encoder, joint.tube):
         assert len(endpoint.link_counters()) < COUNTERS_AT_MOST
         assert endpoint.waiting <= 2 * (QUEUE_LIMIT + WINDOW)
-    joint.now += 2.0 * SILENCE  # whoever was taken for the other end is forgotten
+    joint.now += 2.0 * SILENCE  # what was taken for the other end is forgotten
     joint.run(20.0)
     before = joint.encoder.waiting
     joint.tube.mail.submit(survey(TUBE, joint.tube.mail.series.take()), joint.now)

@@ -1,4 +1,4 @@
-"""What drives a process: steps on a bus and in memory, the inbox of a loop, an end at which nobody is."""
+"""What drives a process: steps on a bus and in memory, the inbox of a loop, an end without a neighbour."""
 
 from __future__ import annotations
 
@@ -340,7 +340,7 @@ class TestOwnClock:
         loop.stop()
         await asyncio.wait_for(running, PATIENCE)
         assert line is not None
-        assert line.startswith("lower end: nobody heard for 60 s, the port is down")
+        assert line.startswith("lower end: no neighbour heard for 60 s, the port is down")
         assert not loop.losses()["ports"]["lower"]["is_up"]
 
     async def test_an_idle_process_answers_on_the_thread_that_hears(self, router: Router) -> None:
@@ -380,14 +380,14 @@ class TestOwnClock:
 
     def test_a_silent_end_is_named_once_until_somebody_is_heard(self) -> None:
         watch = AbsenceWatch(Side, begin=100.0)
-        nobody: dict[Side, object] = dict.fromkeys(Side)
-        upper = nobody | {Side.UPPER: "encoder"}
+        silent: dict[Side, object] = dict.fromkeys(Side)
+        upper = silent | {Side.UPPER: "encoder"}
         assert watch.find(upper, 101.0) == []
         assert watch.find(upper, 100.0 + ABSENT_LIMIT) == [Side.LOWER]
-        assert watch.find(nobody, 101.0 + ABSENT_LIMIT) == []
-        assert watch.find(nobody, 101.0 + 2.0 * ABSENT_LIMIT) == [Side.UPPER]
-        assert watch.find(nobody | {Side.LOWER: "tube"}, 102.0 + 2.0 * ABSENT_LIMIT) == []
-        assert watch.find(nobody, 103.0 + 3.0 * ABSENT_LIMIT) == [Side.LOWER]
+        assert watch.find(silent, 101.0 + ABSENT_LIMIT) == []
+        assert watch.find(silent, 101.0 + 2.0 * ABSENT_LIMIT) == [Side.UPPER]
+        assert watch.find(silent | {Side.LOWER: "tube"}, 102.0 + 2.0 * ABSENT_LIMIT) == []
+        assert watch.find(silent, 103.0 + 3.0 * ABSENT_LIMIT) == [Side.LOWER]
 
 
 @contextlib.asynccontextmanager

@@ -1,4 +1,4 @@
-"""Seals: what is forged, repeated or of somebody else has no effect and is counted; what is honest arrives."""
+"""Seals: what is forged, repeated or meant for another has no effect and is counted; what is honest arrives."""
 
 from __future__ import annotations
 

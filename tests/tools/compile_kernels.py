@@ -6,34 +6,36 @@ kernels in floats share three functions of four, so those come one after the oth
 
 import importlib
 import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from node.firmware.kernel_choice import Loop
 
 
 def floats() -> None:
-    """The usual kernel of a node and the string of the studies around it, the other kernels in floats, and surveys."""
+    """The usual kernel of a node and the string of the studies around it, the published form of it, and surveys."""
     from groundstation.survey.well.compiled_model import preload_models
-    from node.firmware.settings import KERNELS
 
     importlib.import_module("borechain.drilling.preload")
     from sim.studies.lab import LAB, run_seed
+    from sim.studies.published_form.published_step import published_loop
 
     run_seed((LAB, 1))
-    for kernel in KERNELS:
-        if kernel not in {"float64", "fixed"}:
-            warm_kernel(kernel)
+    warm_loop(published_loop())
     preload_models()
 
 
 def integers() -> None:
     """A node in integers."""
-    warm_kernel("fixed")
-
-
-def warm_kernel(name: str) -> None:
-    """Compile a kernel of a node."""
     from node.firmware.kernel_choice import kernel_of
-    from node.kernels.step.warm import warm_step
 
-    loop = kernel_of(name)
+    warm_loop(kernel_of("fixed"))
+
+
+def warm_loop(loop: "Loop") -> None:
+    """Compile a kernel of a node."""
+    from node.kernels.step.precompile import warm_step
+
     warm_step(loop.step, loop.aiding)
 
 

@@ -37,7 +37,7 @@ ASIDE = 500  # no file of a launcher has such a number
 class Forker:
     """A process that forks commands of ``python``'s environment, for all workers of one run of the tests.
 
-    Whoever needs it first starts it; it ends with the run, or after a ``with``.
+    The first worker that needs it starts it; it ends with the run, or after a ``with``.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ class Command:
         return self.returncode
 
     def communicate(self, timeout: float | None = None) -> tuple[str, str]:
-        """What it wrote, once it has ended and nobody can write any more."""
+        """What it wrote, once it has ended and nothing can be written any more."""
         until = None if timeout is None else time.monotonic() + timeout
         texts = {self.stdout: b"", self.stderr: b""}
         rest: list[IO[str]] = [file for file in texts if not file.closed]

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 PROGRAMS = Path("/usr/lib/postgresql")
-NOBODY = "nobody"
+UNPRIVILEGED = "nobody"  # user
 
 
 def find_program(name: str) -> str | None:
@@ -24,7 +24,7 @@ def find_program(name: str) -> str | None:
 
 @contextlib.contextmanager
 def running_postgres() -> Iterator[str]:
-    """URL of an empty database; the server refuses to be root, who starts it as nobody."""
+    """URL of an empty database; the server refuses to run as root, which starts it as another user."""
     initdb, postgres = find_program("initdb"), find_program("postgres")
     assert initdb is not None, "no PostgreSQL: run make browser"
     assert postgres is not None
@@ -32,7 +32,7 @@ def running_postgres() -> Iterator[str]:
         folder = Path(name)
         who: dict[str, Any] = {}
         if os.geteuid() == 0:
-            user = pwd.getpwnam(NOBODY)
+            user = pwd.getpwnam(UNPRIVILEGED)
             os.chown(folder, user.pw_uid, user.pw_gid)
             who = {"user": user.pw_uid, "group": user.pw_gid, "extra_groups": []}
         data = folder / "data"

@@ -15,8 +15,8 @@ import numpy.typing as npt
 from second_world import BEGIN, BLOCKS, DRILL, HOLD, PERIOD, STOP, Cycles, Disturbance, SecondWorld
 
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.settings import Joint, TubeSettings
 from node.firmware.tube import Tube
+from node.firmware.tube_settings import MakeUpAngle, TubeSettings
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import new_node
 from telemetry.messages import Aiding, Event, NodeFlag, NodeState, SurveyMeasurement
@@ -94,9 +94,9 @@ def drill(name: str, seed: int) -> Seen:
     marks = MARK_STD * random.standard_normal(3) if grows else np.zeros(3)
     std = MARK_STD if grows else 0.0
     drives = [joint + float(marks[0]) + (0.0 if grows else misread), second + float(marks[1]) + misread]
-    lower = Joint(joint - second + float(marks[2]), std)
-    upper = TubeSettings(2, Joint(drives[1], std), lower, state_every=1)
-    tubes = [_tube(TubeSettings(1, Joint(drives[0], std), state_every=1))] + ([_tube(upper)] if grows else [])
+    lower = MakeUpAngle(joint - second + float(marks[2]), std)
+    upper = TubeSettings(2, MakeUpAngle(drives[1], std), lower, state_every=1)
+    tubes = [_tube(TubeSettings(1, MakeUpAngle(drives[0], std), state_every=1))] + ([_tube(upper)] if grows else [])
     sensors = [world.sensor(joint, phase)] + ([world.sensor(second, phase)] if grows else [])
     clocks = CLOCK_STD * random.standard_normal(2)
     said, count, faults, surveys = world.encoder(), len(world.ends), [], set()

@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import butter, lfilter, sosfilt, sosfilt_zi
 
-from node.firmware.encoder import EncoderNode, EncoderSample
+from node.firmware.encoder_node import EncoderNode, EncoderSample
+from node.process.drivers.fifo_window import parts_of
 from node.process.drivers.frame_clock import FrameClock
-from node.process.drivers.parts import parts_of
 from telemetry.messages import Aiding
 
 Array = npt.NDArray[np.float64]

@@ -26,9 +26,9 @@ COLUMNS = tuple(
 
 
 @click.command()
-@click.option("--tubes", type=click.IntRange(1, 250), default=3, show_default=True, help="Of the string.")
+@click.option("--tubes", type=click.IntRange(1, 250), default=3, show_default=True, help="Tubes of the string.")
 @click.option(
-    "--seconds", type=click.FloatRange(20.0, 864000.0), default=3600.0, show_default=True, help="It drills (wall time)."
+    "--seconds", type=click.FloatRange(20.0, 864000.0), default=3600.0, show_default=True, help="Wall time of drilling."
 )
 @click.option("--speed", type=click.FloatRange(0.1, 100.0), default=1.0, show_default=True, help="X times real time.")
 @endpoint_option("Where its router listens.")

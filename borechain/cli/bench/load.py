@@ -17,16 +17,16 @@ if TYPE_CHECKING:
     from groundstation.gateway.page.settings import PageSettings
 
 page_option = click.option(
-    "--page", "address", metavar="HOST:PORT", default="127.0.0.1:8080", show_default=True, help="Of the page."
+    "--page", "address", metavar="HOST:PORT", default="127.0.0.1:8080", show_default=True, help="Address of the page."
 )
 
 
 @click.command()
-@click.option("--tubes", type=click.IntRange(1, 250), default=50, show_default=True, help="That tell their state.")
-@click.option("--browsers", type=click.IntRange(0, 60), default=3, show_default=True, help="That follow the page.")
-@click.option("--terminals", type=click.IntRange(0, 60), default=2, show_default=True, help="That follow the keys.")
+@click.option("--tubes", type=click.IntRange(1, 250), default=50, show_default=True, help="Tubes that send.")
+@click.option("--browsers", type=click.IntRange(0, 60), default=3, show_default=True, help="Browsers on the page.")
+@click.option("--terminals", type=click.IntRange(0, 60), default=2, show_default=True, help="Followers of the keys.")
 @click.option(
-    "--seconds", type=click.FloatRange(5.0, 86400.0), default=150.0, show_default=True, help="Of the measurement."
+    "--seconds", type=click.FloatRange(5.0, 86400.0), default=150.0, show_default=True, help="Duration of the load."
 )
 @page_option
 @endpoint_option("Where its router listens.")
@@ -62,7 +62,7 @@ def page(tubes: int, browsers: int, terminals: int, seconds: float, address: str
 
 
 def free_page(address: str, endpoint: str) -> PageSettings:
-    """Where a page is to be, once nobody else is found there or at the endpoint; a plain error otherwise."""
+    """Settings of a page at ``address``, checked to be free like the endpoint; a plain error otherwise."""
     from groundstation.gateway.page.settings import PageSettings, listen, parse_address
     from sim.rig.launcher import check_port_free
 
@@ -73,8 +73,8 @@ def free_page(address: str, endpoint: str) -> PageSettings:
 
 
 @click.command()
-@click.option("--hours", type=click.FloatRange(0.1, 168.0), default=24.0, show_default=True, help="Of drilling.")
-@click.option("--tubes", type=click.IntRange(1, 250), default=50, show_default=True, help="That survey at every stop.")
+@click.option("--hours", type=click.FloatRange(0.1, 168.0), default=24.0, show_default=True, help="Hours of drilling.")
+@click.option("--tubes", type=click.IntRange(1, 250), default=50, show_default=True, help="Surveyed at every stop.")
 @page_option
 @endpoint_option("Where its router listens.")
 @json_option
@@ -105,10 +105,12 @@ def day(hours: float, tubes: int, address: str, endpoint: str, as_json: bool) ->
 
 
 @click.command()
-@click.option("--surveys", type=click.IntRange(500, 1_000_000), default=10_000, show_default=True, help="That it has.")
-@click.option("--tubes", type=click.IntRange(2, 250), default=50, show_default=True, help="That survey at every stop.")
+@click.option(
+    "--surveys", type=click.IntRange(500, 1_000_000), default=10_000, show_default=True, help="Stored before."
+)
+@click.option("--tubes", type=click.IntRange(2, 250), default=50, show_default=True, help="Surveyed at every stop.")
 # after 15 stops the bit is deeper than its string by what a ground station lets pass
-@click.option("--stops", type=click.IntRange(3, 15), default=12, show_default=True, help="That it learns more.")
+@click.option("--stops", type=click.IntRange(3, 15), default=12, show_default=True, help="Stops to learn.")
 @json_option
 @require_modules("orjson", "rich", "scipy", "sqlalchemy")
 @plain_faults
@@ -147,9 +149,9 @@ def latency_line(what: str, figures: dict[str, Any]) -> str:
 
 
 @click.command()
-@click.option("--times", type=click.IntRange(1, 10_000), default=200, show_default=True, help="It is killed.")
+@click.option("--times", type=click.IntRange(1, 10_000), default=200, show_default=True, help="Number of kills.")
 @click.option(
-    "--database", metavar="URL", help="Of an empty database, such as postgresql://USER@HOST/NAME  [default: SQLite]"
+    "--database", metavar="URL", help="An empty database, such as postgresql://USER@HOST/NAME  [default: SQLite]"
 )
 @endpoint_option("Where its router listens.")
 @json_option
@@ -157,7 +159,7 @@ def latency_line(what: str, figures: dict[str, Any]) -> str:
 @require_modules("orjson", "rich", "scipy", "sqlalchemy")
 @plain_faults
 def killed(times: int, database: str | None, endpoint: str, as_json: bool, seed: int) -> None:
-    """Kill a ground station at moments by lot while it takes events, and look whether what it receipted is kept.
+    """Kill a ground station at random moments while it takes events, and check that what it receipted is kept.
 
     Exit status 1 when anything was lost or doubled.
 

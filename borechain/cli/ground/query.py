@@ -78,7 +78,7 @@ def query(
     if not answers and replies:
         raise EnvironmentFault(f"{selector}: no answer within {patience:g} s; a longer --timeout may help")
     if not answers:
-        raise EnvironmentFault(f"{selector}: nobody at {endpoint} answers it; {there}. {known_keys()}")
+        raise EnvironmentFault(f"{selector}: no answer from {endpoint}; {there}. {known_keys()}")
     if as_csv:
         click.echo(csv_of(answers), nl=False)
         return
@@ -145,7 +145,7 @@ def watch(
 
 
 def check_selector(selector: str) -> None:
-    """Refuse what is no key expression before anything connects.
+    """Refuse an invalid key expression before anything connects.
 
     Raises
     ------

@@ -16,7 +16,7 @@ from telemetry.runtime.command_line import check_installed
 
 @click.command()
 @click.option(
-    "--tubes", type=click.IntRange(1, 250), multiple=True, default=(10, 25, 50), help="Below the joint. Repeat."
+    "--tubes", type=click.IntRange(1, 250), multiple=True, default=(10, 25, 50), help="Tubes below it. Repeat."
 )
 @click.option(
     "--bitrate",

@@ -18,7 +18,7 @@ folder_option = click.option(
     type=click.Path(path_type=Path, file_okay=False),
     default=Path("stick"),
     show_default=True,
-    help="Folder of the rig's keys; it belongs on a stick in the pocket of who answers for the rig.",
+    help="Folder of the rig's keys; keep it on a stick, with the person responsible for the rig.",
 )
 tube_argument = click.argument("tube", type=int)
 
@@ -94,7 +94,7 @@ def tube(tube: int, folder: Path) -> None:
 @folder_option
 @plain_faults
 def revoke(tube: int, folder: Path) -> None:
-    """Have TUBE believed nothing, and make new keys for all others.
+    """Revoke TUBE, so that it is believed nothing, and make new keys for all others.
 
     Take the new files to the base, the encoder and every tube that can be reached; a tube that has not got its file yet
     goes on with its old keys, and lets TUBE speak where it is its neighbour.
@@ -117,7 +117,7 @@ def revoke(tube: int, folder: Path) -> None:
 @folder_option
 @plain_faults
 def rotate(folder: Path) -> None:
-    """Make new keys for everybody; those of before are valid for a day, and warned of after that.
+    """Make new keys for all; the old ones stay valid for a day, with a warning after that.
 
     \b
     Example:
@@ -141,7 +141,7 @@ def rotate(folder: Path) -> None:
 @folder_option
 @plain_faults
 def retire(folder: Path) -> None:
-    """End the keys of before the last change: everybody who matters has the new ones.
+    """End the keys from before the last change, once every process of the rig has the new ones.
 
     \b
     Example:
@@ -185,7 +185,7 @@ def password(role: str, path: Path) -> None:
 
 
 def stdin_is_terminal() -> bool:
-    """Whether somebody can be asked."""
+    """Return whether a question can be asked on the terminal."""
     return sys.stdin.isatty()
 
 

@@ -160,6 +160,6 @@ def chosen_view(view: str | None, *, inline: bool, quiet: bool, on_terminal: boo
 
 
 def print_line(line: str) -> None:
-    """Write a line at once, for whoever follows a file."""
+    """Write a line and flush it, so that a follower of the file sees it at once."""
     click.echo(line)
     sys.stdout.flush()

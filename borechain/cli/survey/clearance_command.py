@@ -1,4 +1,4 @@
-"""``borechain clearance``: how far two holes keep from each other, with what they share."""
+"""``borechain clearance``: clearance between two holes, with the errors they share."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ def application(process: GroundProcess, page: PageSettings, hub: Hub) -> Starlet
         return FileResponse(FILES / "index.html", headers={"cache-control": "no-cache"})
 
     async def failed(request: Request, error: Exception) -> Response:
-        """A fault of ours is counted and told to whoever asked, and the next one is answered."""
+        """Count an internal error and report it in the answer; the next request is answered."""
         process.endpoint.counters["failed_queries"] += 1
         line = f"{request.url.path[:80]}: the ground station failed: {type(error).__name__}"
         return JSONResponse({"error": line}, 500)

@@ -29,7 +29,7 @@ from telemetry.errors import TelemetryError
 READERS = 64  # streams at a time
 SILENCE_S = 10.0  # after which a stream without news sends a comment, so that its reader knows that it is there
 SLOW_S = 30.0  # for which a packet may wait for its reader
-ANSWERED_WITHIN_S = 30.0  # for which who asks to wait for an order is kept waiting
+ANSWERED_WITHIN_S = 30.0  # longest wait of a request for the end of its order
 COOKIE = "borechain"
 CSRF = "x-csrf-token"
 
@@ -113,7 +113,7 @@ class Doors:
         except SelectorError as error:
             raise RequestError(400, str(error).replace("by:", "name:")) from error
         if not self._page.passwords:
-            raise RequestError(403, "nobody can sign in: the ground station was started without --page-passwords")
+            raise RequestError(403, "sign-in is off: the ground station was started without --page-passwords")
         await self._check_password(role, password, address_of(request))
         session = self._sessions.begin(role, name.strip(), time.monotonic())
         response = JSONResponse(self._shown(session))
@@ -176,7 +176,7 @@ class Doors:
             raise RequestError(429, f"too soon after a wrong password; wait {math.ceil(hold)} s", retry_after=hold)
         async with self._one_at_a_time:
             known = self._page.passwords.get(role)
-            hashed = known or next(iter(self._page.passwords.values()))  # a role that is none takes as long
+            hashed = known or next(iter(self._page.passwords.values()))  # an unknown role takes as long
             right = await asyncio.to_thread(is_right, password, hashed)
         if right and known is not None:
             self._wrong.forgive(address)
@@ -219,7 +219,7 @@ async def gone_reader(receive: Receive, close: Callable[[], None]) -> None:
 
 
 async def give(send: Send, packet: bytes) -> None:
-    """Send a part of a stream; TimeoutError where nobody takes it."""
+    """Send a part of a stream; TimeoutError where the reader does not take it."""
     async with asyncio.timeout(SLOW_S):
         await send({"type": "http.response.body", "body": packet, "more_body": True})
 
@@ -248,7 +248,7 @@ def shown(name: str, value: object) -> str:
 
 
 def address_of(request: Request) -> str:
-    """Who asks, for counting."""
+    """Address of the asking host, for counting."""
     return request.client.host if request.client is not None else ""
 
 

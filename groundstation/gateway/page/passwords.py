@@ -12,7 +12,7 @@ from cryptography.hazmat.primitives.kdf.argon2 import Argon2id
 from groundstation.errors import ConfigurationError
 from telemetry.transport.key_ring import read_private
 
-OPERATOR, DRILLER = "operator", "driller"  # who reads; who orders too
+OPERATOR, DRILLER = "operator", "driller"  # one reads, the other also orders
 ROLES = (OPERATOR, DRILLER)
 SHORTEST, LONGEST = 8, 256  # characters
 SALT_BYTES, HASH_BYTES = 16, 32
@@ -47,7 +47,7 @@ def is_right(password: str, hashed: str) -> bool:
 
 
 def drawn_password() -> str:
-    """A password by lot, of 80 bits, in groups that can be read out."""
+    """Return a random password of 80 bits, in groups that can be read out."""
     letters = "abcdefghjkmnpqrstuvwxyz23456789"
     return "-".join("".join(secrets.choice(letters) for _ in range(4)) for _ in range(4))
 

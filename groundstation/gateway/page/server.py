@@ -15,7 +15,7 @@ from groundstation.gateway.page.hub import Hub
 from groundstation.gateway.page.settings import PageSettings
 from groundstation.service.process.ground_process import GroundProcess
 
-CONNECTIONS = 200  # at a time; who comes later is told to come again
+CONNECTIONS = 200  # at a time; a later one is told to come again
 IDLE_S = 10.0  # for which a connection may have no request, or be closing
 SWEEP_S = 1.0
 LARGEST_HEAD = 16_384  # bytes of a request before its body
@@ -36,8 +36,8 @@ class Server(uvicorn.Server):
 class Sweeper:
     """Ends connections that have no request under way for some time, and those that close without end.
 
-    Whoever holds every place would otherwise keep the crew out: a connection that never asks, asks a letter a minute,
-    or takes no answer.
+    A client that holds every place would otherwise keep the crew out: by connections that never ask, ask a letter a
+    minute, or take no answer.
     """
 
     def __init__(self, server: uvicorn.Server) -> None:
@@ -129,7 +129,7 @@ async def serving_page(process: GroundProcess, page: PageSettings, listening: so
         ssl_certfile=page.certificate,
         ssl_keyfile=page.key,
     )
-    quiet = logging.getLogger("uvicorn.error")  # what it would write is answered, or nobody's business
+    quiet = logging.getLogger("uvicorn.error")  # what it would write is in the answer already, or concerns no user
     quiet.addHandler(logging.NullHandler())
     quiet.propagate = False
     keeper = Keeper(process, config, listening)

@@ -1,4 +1,4 @@
-"""Who is signed in at the page: sessions by lot, and what wrong passwords cost. No I/O, no clock of its own."""
+"""Sessions of the page: random tokens, and the delay after wrong passwords. No I/O, no clock of its own."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FORGOTTEN_S = 900.0  # s after which wrong passwords of an address no longer cou
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """Somebody who is signed in until ``ends_at`` (s); ``csrf`` is to be repeated with every order."""
+    """One sign-in, valid until ``ends_at`` (s); every order must repeat ``csrf``."""
 
     token: str
     csrf: str
@@ -32,7 +32,7 @@ class Sessions:
         self._sessions: OrderedDict[str, Session] = OrderedDict()
 
     def begin(self, role: str, name: str, now: float) -> Session:
-        """Sign somebody in."""
+        """Begin and return a session of a role under a name."""
         session = Session(secrets.token_urlsafe(32), secrets.token_urlsafe(32), role, name, now + VALID_S)
         self._sessions[session.token] = session
         while len(self._sessions) > SESSIONS:
@@ -48,7 +48,7 @@ class Sessions:
         return session
 
     def end(self, session: Session) -> None:
-        """Sign somebody out."""
+        """End a session."""
         self._sessions.pop(session.token, None)
 
 

@@ -53,7 +53,7 @@ def parse_address(text: str) -> tuple[str, int]:
     Raises
     ------
     ConfigurationError
-        When it is none.
+        When it is invalid.
     """
     host, _, port = text.rpartition(":")
     host = host.removeprefix("[").removesuffix("]")
@@ -68,7 +68,7 @@ def check_certificate(certificate: Path, key: Path) -> None:
     Raises
     ------
     ConfigurationError
-        When they are no certificate and its key.
+        When they are not a certificate and its key.
     """
     try:
         ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key)

@@ -32,10 +32,10 @@ Key = tuple[str, str]  # code and subject
 class State(enum.StrEnum):
     """How far an alarm is."""
 
-    RAISED = "raised"  # its condition stands, nobody has acknowledged it
+    RAISED = "raised"  # its condition stands, not acknowledged
     ACKNOWLEDGED = "acknowledged"  # its condition stands
     SHELVED = "shelved"  # put away for a time
-    LATCHED = "latched"  # its condition is gone, nobody has acknowledged it
+    LATCHED = "latched"  # its condition is gone, not acknowledged
     CLEARED = "cleared"
 
 
@@ -167,7 +167,7 @@ class CrewAlarms:
         Raises
         ------
         SelectorError
-            When there is none of that number, or somebody was first; it is told who.
+            When there is none of that number, or it was acknowledged before; the message says by whom.
         """
         alarm = self._get(number)
         if alarm.acknowledged_by:

@@ -22,7 +22,7 @@ class Health(IntEnum):
 
     GOOD = 0
     DEGRADED = 1  # less than planned, nothing wrong
-    UNKNOWN = 2  # nobody can tell: no rig time, no depth, or nobody has been heard
+    UNKNOWN = 2  # cannot be told: no rig time, no depth, or no tube heard
     BAD = 3  # something is wrong, or was lost
 
 
@@ -84,7 +84,7 @@ KINDS: tuple[AlarmKind, ...] = (
     AlarmKind("database", BAD, "messages in the database are damaged; they are asked for again"),
     AlarmKind("queue", DEGRADED, "a queue of the ground station was full and dropped something"),
     AlarmKind("bad_input", NOTICE, "bytes came that are no message of ours; they were dropped"),
-    AlarmKind("wrong_password", NOTICE, "somebody has tried a wrong password on the page; the detail says how often"),
+    AlarmKind("wrong_password", NOTICE, "a wrong password was tried on the page; the detail says how often"),
     AlarmKind("page_restarted", NOTICE, "the page's web server has failed and was started again"),
     AlarmKind("seal_refused", NOTICE, "frames or messages were forged or repeated; they had no effect"),
     AlarmKind("key_file", DEGRADED, "the key file was changed and cannot be used, or holds keys that should be ended"),

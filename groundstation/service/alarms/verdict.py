@@ -29,7 +29,7 @@ class Word(enum.StrEnum):
 
 
 class Doubt(enum.StrEnum):
-    """Why nobody can tell."""
+    """Reason of the verdict "don't know"."""
 
     NO_SURVEY = "no_survey"
     STALE = "stale"

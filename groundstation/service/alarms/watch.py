@@ -221,8 +221,8 @@ class Watch:
         if not model.knows_tubes:
             return  # who ran all the while may not have been heard yet
         lately = [tube for tube in model.tally.tubes if model.age(tube) <= OFF_BEFORE]
-        if nobody := self._witnesses.look(model.epoch, model.rig_now, lately):
-            self._alarms.alert("reference", "encoder", nobody)
+        if unwatched := self._witnesses.look(model.epoch, model.rig_now, lately):
+            self._alarms.alert("reference", "encoder", unwatched)
 
     def _look_at_belt(self) -> None:
         nodes = self._model.nodes
@@ -270,7 +270,7 @@ class Watch:
 
 
 def _number(event: Event, name: str) -> float:
-    """An argument of an event; NaN where it is none, for somebody may have made the event up."""
+    """An argument of an event as a float; NaN if it is missing or no number, for the event may be forged."""
     value = event.arguments.get(name)
     return float(value) if isinstance(value, int | float) else math.nan
 

@@ -3,7 +3,7 @@
 A tube is a witness of a time if it ran through it: one that started then, or stood still, took the yaw that it was
 given, and one whose gyroscope gave nothing took the rate of the encoder: none of them has anything to say. So a
 contradiction counts against the encoder when all who could have seen it agree. Where every tube starts upon a yaw that
-was saved over other joints than its own, or without any because the string turned when the power went, nobody has
+was saved over other joints than its own, or without any because the string turned when the power went, no tube has
 watched the encoder meanwhile, and that is said too.
 """
 
@@ -78,8 +78,8 @@ class Witnesses:
             self._count(self._dated(event, rejected), rejected)
         elif event.code == ELSEWHERE and self._was_restored(event) and not self._was_settled(event):
             self._elsewhere[event.tube] = event
-            if nobody := self._nobody_has_watched(event, heard):
-                return nobody
+            if unwatched := self._nobody_has_watched(event, heard):
+                return unwatched
         return self._judge(heard)
 
     def on_lost(self, tube: int, lost: tuple[int, int], heard: Collection[int], *, doubts: bool) -> str:
@@ -100,14 +100,14 @@ class Witnesses:
     def look(self, epoch: int, rig_now: float, lately: Collection[int]) -> str:
         """Says so where all who were heard lately started at one time without a yaw; at a rig time (s) of an epoch.
 
-        Nothing links what the encoder counts now to what it counted before. Whoever ran all the while below a tube
+        Nothing links what the encoder counts now to what it counted before. A tube that ran all the while below one
         without power is heard again within the time in which that tube settles.
         """
         blank: list[Event] = []
         for tube in lately:
             start = max(self._starts.get(tube, ()), key=_in_time, default=None)
             if start is None or not _is_blank(start):
-                return ""  # as nearly always, by the first of them
+                return ""  # the usual case, found at the first tube
             blank.append(start)
         if not blank or blank == self._told_blank:
             return ""
@@ -117,7 +117,7 @@ class Witnesses:
         if not all(self._is_beside(one, newest) for one in blank):
             return ""
         self._told_blank = blank
-        return f"nobody watched it before {newest.at:.0f} s: no tube has kept its yaw"
+        return f"no tube watched it before {newest.at:.0f} s: none has kept its yaw"
 
     def _judge(self, heard: Collection[int]) -> str:
         known = self._contradicted.values()
@@ -178,7 +178,7 @@ class Witnesses:
         found = [self._elsewhere.get(tube) for tube in heard]
         if not all(one is not None and self._is_beside(one, event) for one in found):
             return ""
-        return f"nobody watched it before {event.at:.0f} s: what the tubes had saved is of other places"
+        return f"no tube watched it before {event.at:.0f} s: what they had saved is of other places"
 
     def _together(self, event: Event) -> tuple[Event, ...]:
         return tuple(e for e in self._contradicted.values() if self._is_beside(e, event))
@@ -229,7 +229,7 @@ class Witnesses:
     def _blind_since(self, event: Event) -> float:
         """Rig time (s) from which on a tube had no gyroscope: from where it began to contradict, if it just did.
 
-        That one repeats itself is seen after some cycles; whether it or the encoder was wrong in them, nobody can say.
+        That one repeats itself is seen after some cycles; whether it or the encoder was wrong in them, is unknown.
         """
         rejected = self._rejected.pop(event.tube, event)
         is_of_this = rejected.epoch == event.epoch and 0.0 <= event.at - rejected.at <= SEEN_LATER

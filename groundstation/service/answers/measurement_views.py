@@ -1,6 +1,6 @@
 """What the keys of the measurements hold: degrees, metres and seconds, the unit in every name.
 
-A hole has ten thousand surveys, and nobody is answered while somebody is shown all of them: their rows are read column
+A hole has ten thousand surveys, and no other query is answered while all are shown: their rows are read column
 by column, and no survey becomes an object on the way.
 """
 

@@ -114,7 +114,7 @@ class RigModel:
     def on_state(self, state: NodeState, now: float) -> bool:
         """Handle a node's state that came at ``now`` (s, own clock), unless a newer one of its epoch is known.
 
-        One that has come before is no sign of life, somebody may have recorded it: False. Nor is one that was on its
+        One that has come before is no sign of life, for it may be a recording: False. Nor is one that was on its
         way for long; it tells that the node spoke then, which is all that a ground station knows after its start.
         """
         known = self.nodes.get(state.tube)
@@ -168,7 +168,7 @@ class RigModel:
         return False
 
     def _is_of_before(self, state: NodeState, known: NodeState) -> bool:
-        """Whether a state leaves its tube's epoch for one that the encoder is not in: somebody has recorded it."""
+        """Whether a state leaves its tube's epoch for one that the encoder is not in: a recording."""
         possible = (known.epoch, self.epoch, EPOCH_UNKNOWN)
         return self.epoch != EPOCH_UNKNOWN and state.epoch not in possible
 
@@ -210,7 +210,7 @@ class RigModel:
     def placeable(self) -> list[tuple[Waiting, float]]:
         """Surveys that waited for their depth and have it now; they wait no more."""
         if not self.waiting:
-            return []  # as nearly always: it is asked at every reading
+            return []  # the usual case: called at every reading
         found = [(one, self.depth_of(one.measurement, one.below)) for one in self.waiting]
         self.waiting = [one for one, md in found if md is None]
         return [(one, md) for one, md in found if md is not None]

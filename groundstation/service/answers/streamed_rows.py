@@ -19,7 +19,7 @@ def window(rows: Iterable[Row], newest: int, p: Parameters) -> list[Row]:
     Raises
     ------
     SelectorError
-        When a parameter is no number of this stream: after a restart the numbers begin anew.
+        When a parameter is not a number of this stream: after a restart the numbers begin anew.
     """
     since, limit = span(newest, p)
     after = sorted((row for row in rows if row["seq"] > since), key=lambda row: int(row["seq"]))

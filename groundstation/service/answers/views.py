@@ -79,7 +79,7 @@ def status(k: RigModel, _p: Parameters) -> View:
 
 
 def changes(k: RigModel, _p: Parameters) -> View:
-    """When each path changed last: whoever holds an answer of before has missed one."""
+    """Revision at which each path changed last: a client with an older answer has missed a change."""
     return {"changes": [{"path": path, "changed_at": at} for path, at in sorted(k.changed_at.items())]}
 
 

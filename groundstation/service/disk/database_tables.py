@@ -95,7 +95,7 @@ DROP_ALARM, ADD_ALARM = sa.delete(ALARMS).where(ALARMS.c.number == sa.bindparam(
 def add_new(dialect: str) -> sa.Insert:
     """Insertion of a message that does nothing where it is there already."""
     if dialect == "postgresql":
-        from sqlalchemy.dialects import postgresql  # 2 MB that nobody with a file needs
+        from sqlalchemy.dialects import postgresql  # 2 MB, not needed with a file
 
         return postgresql.insert(MESSAGES).on_conflict_do_nothing()
     return sqlite.insert(MESSAGES).on_conflict_do_nothing()

@@ -1,7 +1,7 @@
 """The surveys of a hole as rows of one table, and those of a station. No I/O.
 
 A ground station keeps every survey of a hole, ten thousand of them after a day. As objects each would take two
-kilobytes; as a row it takes a sixth of that, and is an object again where somebody looks at it.
+kilobytes; as a row it takes a sixth of that, and becomes an object again when it is read.
 """
 
 from __future__ import annotations
@@ -281,7 +281,7 @@ class Clusters:
         self.forget_departures(place)
 
     def departure(self, place: int) -> Departure | None:
-        """How far a cluster departed from those before it; None where nobody has worked it out."""
+        """How far a cluster departed from those before it; None where it was not computed."""
         row = self._rows[place]
         size = self._table.rows["departure"].item(row)
         return None if math.isnan(size) else (self._table.rows["departed"][row].copy(), size)

@@ -1,7 +1,7 @@
 """The hole as it was surveyed: stations, what moved, trajectory, deviations and their alarms. No I/O.
 
 Surveys come many at a time, one of every tube at a stop. What follows from all of them is worked out once, when
-somebody asks for it: fifty tubes would keep the ground station busy for the length of the stop otherwise.
+a query asks for it: fifty tubes would keep the ground station busy for the length of the stop otherwise.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ class OrderState(enum.StrEnum):
 class Order:
     """One order.
 
-    ``tube`` is None for an order to the ground station. ``answered`` means that whoever ordered can have an
+    ``tube`` is None for an order to the ground station. ``answered`` means that its sender can have an
     answer: the tube obeyed or refused, or the order ended.
     """
 

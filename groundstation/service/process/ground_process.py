@@ -79,7 +79,7 @@ Listener = Callable[[list[str]], None]  # takes the paths below ground/ that cha
 class GroundProcess(Process):
     """Everything the ground station does at each event of its link.
 
-    Whoever drives it and whoever comes in by ``operator`` does so on one thread.
+    Its driver and the callers of ``operator`` run on one thread.
 
     Parameters
     ----------
@@ -340,7 +340,7 @@ class GroundProcess(Process):
 
     def _publish(self, changed: list[str]) -> None:
         model = self.model
-        model.revision += 1  # whoever holds an older answer can tell
+        model.revision += 1  # an older answer can be told by it
         model.changed_at |= {path: model.revision for path in changed if "/" not in path and path not in BEATS}
         for listener in self.listeners:
             listener(changed)

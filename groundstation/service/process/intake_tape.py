@@ -1,7 +1,7 @@
 """What a ground station takes in, event by event: enough to give another one the same knowledge, bit for bit.
 
 An event is what came and the time at which it came, on the own clock and in rig time; frames, receipts and what was
-sent are not in it. A tape keeps the newest events for whoever listens a moment later.
+sent are not in it. A tape keeps the newest events for listeners that come a moment later.
 """
 
 from __future__ import annotations

@@ -47,11 +47,11 @@ class Learner:
 
         What was stored already changes nothing; what is not stored is not acknowledged, and comes again. A survey is
         fused at the next reading or look, with all that came meanwhile and in their order: whether a reading brackets
-        its time already is a matter of a millisecond. Where one does, as nearly always, its row needs no second
+        its time already is a matter of a millisecond. Where one does, the usual case, its row needs no second
         transaction.
         """
         if not self._arrived:
-            return [], []  # as nearly always: it is asked after every event
+            return [], []  # the usual case: called after every event
         arrived, self._arrived = self._arrived, []
         try:
             are_new = self.store_arrived(arrived)

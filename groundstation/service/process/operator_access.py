@@ -1,6 +1,6 @@
 """The doors of the ground station: ask, order, upload, recalibrate; the same for every gateway.
 
-A plain object without bus, lock or thread: whoever calls does so from the thread that also drives the process.
+A plain object without bus, lock or thread: callers run on the thread that also drives the process.
 """
 
 from __future__ import annotations
@@ -224,7 +224,7 @@ class Operator:
         self.publish_orders()
 
     def reply_of(self, order: Order) -> View:
-        """Answer to whoever ordered: the order, or how far the calibration in the field has come."""
+        """Answer to the sender of an order: the order, or how far the calibration in the field has come."""
         is_recalibration = order.spec.name == "recalibrate"
         return self.ask("recalibration" if is_recalibration else f"orders/{order.number}")
 

@@ -220,7 +220,7 @@ class DepthLog:
         return replace(stand, begun_at=begun_at) if goes_on and begun_at < stand.ended_at else None
 
     def _suspect(self, one: Stand, other: Stand) -> None:
-        """Take a contradiction for a jump that nobody heard: what came since may be as wrong as the later stand."""
+        """Take a contradiction for an unheard jump: what came since may be as wrong as the later stand."""
         first, second = sorted((one, other), key=lambda stand: stand.begun_at)
         if not self.jumped:
             self.jumped = f"from {first.md:.2f} m to {second.md:.2f} m between two stands"

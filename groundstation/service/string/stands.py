@@ -36,7 +36,7 @@ def take_stand(depths: DepthLog, stops: Stops, told: Stand) -> None:
 
 
 def take_survey(depths: DepthLog, stops: Stops, epoch: int, at: float) -> None:
-    """The first stand that is known is a stop where a survey was taken in it (s): nobody heard how it began."""
+    """Take the first known stand for a stop if a survey was taken in it, at ``at`` (s): its begin was not heard."""
     for first in depths.stands[:1]:
         if belongs(first, epoch, at):
             stops.on_stand(first)

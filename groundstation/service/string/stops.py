@@ -1,7 +1,7 @@
 """Where the string stopped to be surveyed, and which tubes have not answered. No I/O.
 
-A stop is a stand of the bit that began with the end of drilling and lasted long enough for a survey; where nobody heard
-how a stand began, it is one if a tube took a survey in it. Every tube in the hole owes one; a tube whose node is still
+A stop is a stand of the bit that began with the end of drilling and lasted long enough for a survey; a stand
+of unheard beginning is one if a tube took a survey in it. Every tube in the hole owes one; a tube whose node is still
 above the collar does not.
 """
 
@@ -44,7 +44,7 @@ class Stop:
         """Whether a survey was taken during the stop.
 
         Where it went on in a later epoch, the earlier one had no other end: what is of it and later is of the stop,
-        also where nobody heard a depth till then.
+        also where no depth was heard till then.
         """
         return any(epoch == own and begin <= at <= end for own, begin, end in self.spans)
 

@@ -51,7 +51,7 @@ def _leg(path: Path, where: str, table: Any) -> Stretch:
 
 
 def read_tie_on(path: Path) -> TieOn:
-    """Where a survey begins.
+    """Return the tie-on of a TOML file: the station at which a survey begins.
 
     Raises
     ------

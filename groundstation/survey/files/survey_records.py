@@ -24,7 +24,7 @@ STATIONS = ("md_m", "inclination_deg", "azimuth_deg")
 
 
 class DisplacementRule(Enum):
-    """How an inclination follows from displacements."""
+    """Rule that gives an inclination from lateral displacements."""
 
     EXACT = "exact"  # I = asin(hypot(a, b) / L), L the measured length between two readings
     THESIS = "thesis"  # I = hypot(atan(a / L), atan(b / L)), which is how Table 4.1 was printed

@@ -78,7 +78,7 @@ class SurveyedBiases:
 def look_of(
     station: Hashable, tube: int, reading: StopDirection, force: Array, var: float, yaw: float, gravity: float
 ) -> Look:
-    """Look of a reading.
+    """Return the look of one tube at a station, from its resolved stop.
 
     Parameters
     ----------
@@ -104,19 +104,19 @@ class Normal:
         self.matrix, self.right = np.eye(size), np.zeros(size)
 
     def add(self, rows: Array, places: Places, weight: Array, value: Array) -> None:
-        """Take ``value`` (m,) = ``rows`` (m, k) @ errors at ``places``, of ``weight`` (m, m)."""
+        """Add observations ``value`` (m,) = ``rows`` (m, k) @ errors at ``places``, of weight ``weight`` (m, m)."""
         self.matrix[np.ix_(places, places)] += rows.T @ weight @ rows
         self.right[places] += rows.T @ weight @ value
 
     def take_out(self, weighed: Array, weight: Array, value: Array) -> None:
-        """Take out an unknown (m,) whose rows sum up to ``weighed`` (m, n), ``weight`` (m, m) and ``value`` (m,)."""
+        """Eliminate an unknown (m,) of rows ``weighed`` (m, n), weight matrix (m, m) and right side ``value`` (m,)."""
         gain = np.linalg.solve(weight, weighed)
         self.matrix -= weighed.T @ gain
         self.right -= gain.T @ value
 
 
 def solve_biases(looks: Sequence[Look], bias_std: float, gravity_std: float) -> dict[int, ForceBias]:
-    """Bias of every tube that looked.
+    """Return the accelerometer bias of every tube of the looks, by tube number.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ Departure = tuple[Array, float]
 
 
 class Weighting(Enum):
-    """How readings of one station count."""
+    """Weights of the readings of one station, oldest first."""
 
     BAYES = "bayes"
     EQUAL = "equal"
@@ -55,7 +55,7 @@ class Stack:
 
 
 def stack_of(readings: Sequence[Direction]) -> Stack:
-    """Readings side by side."""
+    """Return readings stacked along a first axis (n,)."""
     rows = [(one.lean, one.down, one.cov, one.information) for one in readings]
     lean, down, cov, information = map(np.array, zip(*rows, strict=True))
     return Stack(lean, down, cov, information, stack_shared_errors(readings, max(one.width for one in readings)))
@@ -71,7 +71,7 @@ class StationFusion:
     _down: float = 0.0
 
     def add_reading(self, reading: Direction) -> None:
-        """Take one more cluster; it weighs by all it does not know, shared errors included."""
+        """Add one cluster, weighted by the inverse of its total covariance, shared errors included."""
         self.add_each([self], stack_of([reading]))
 
     def fused(self) -> Direction:
@@ -80,7 +80,7 @@ class StationFusion:
 
     @staticmethod
     def add_each(fusions: Sequence[StationFusion], readings: Stack) -> None:
-        """Give each of several stations its reading; the same bit for bit as one after the other."""
+        """Add one reading to each of several stations; equal bit for bit to adding them one by one."""
         weighed = readings.information @ readings.shared
         shared = np.zeros((*weighed.shape[:2], max(weighed.shape[2], *(one._shared.width for one in fusions))))
         for own, one in zip(shared, fusions, strict=True):
@@ -98,7 +98,7 @@ class StationFusion:
 
     @staticmethod
     def fuse_each(fusions: Sequence[StationFusion]) -> list[Direction]:
-        """What each of several stations comes to."""
+        """Return the fused direction of each station."""
         sums = np.array([one._sums for one in fusions])
         gains = np.linalg.inv(sums[:, :2])
         leans = (gains @ sums[:, 2, :, None])[:, :, 0]
@@ -111,7 +111,7 @@ class StationFusion:
 
 
 class GrowingBayes:
-    """Recursive Bayes of readings that mostly grow at their end: what those before came to is used again."""
+    """Recursive Bayes of readings that mostly grow at their end: the sum over the earlier ones is reused."""
 
     def __init__(self) -> None:
         self._fusion = StationFusion()
@@ -119,7 +119,7 @@ class GrowingBayes:
         self._known: Direction | None = None  # what they came to
 
     def of(self, begin: int, end: int, readings: Callable[[int, int], Iterable[Direction]]) -> Direction:
-        """The same as ``fuse_by_bayes`` of the readings from ``begin`` to before ``end``, bit for bit.
+        """Return ``fuse_by_bayes`` of the readings from ``begin`` to before ``end``, equal bit for bit.
 
         ``readings(begin, end)`` gives those of such a range.
         """
@@ -133,11 +133,11 @@ class GrowingBayes:
         return self._known
 
     def known(self, begin: int, end: int) -> Direction | None:
-        """What the readings of a range came to, where that is what was asked for last."""
+        """Return the fused direction of a range if it was the last one asked for, else None."""
         return self._known if (begin, end) == (self._begin, self._end) else None
 
     def lacks_one(self, begin: int, end: int) -> bool:
-        """Whether of the readings of a range the last one alone is not in the sum yet."""
+        """Return whether the sum holds all readings of a range but the last."""
         return (begin, end) == (self._begin, self._end + 1)
 
     @staticmethod
@@ -149,7 +149,7 @@ class GrowingBayes:
             one._end, one._known = one._end + 1, known
 
     def forget(self, place: int) -> None:
-        """The reading at a place, and those behind it, are others than before."""
+        """Drop the sum if it holds the reading at ``place``, which has changed with all behind it."""
         if place < self._end:
             self._fusion, self._end, self._known = StationFusion(), self._begin, None
 
@@ -197,12 +197,12 @@ def adaptive_weighting(readings: Sequence[Direction]) -> Weighting:
 
 
 def newest_departure(readings: Sequence[Direction]) -> tuple[Array, float]:
-    """How far the newest reading is from those before: vector (2,) and size in standard deviations; 0 for a first."""
+    """Departure of the newest reading from those before: vector (2,), size in standard deviations; 0 for a first."""
     return departure_from(fuse_by_bayes(readings[:-1]), readings[-1]) if len(readings) > 1 else (np.zeros(2), 0.0)
 
 
 def departure_from(earlier: Direction, newest: Direction) -> tuple[Array, float]:
-    """How far a reading is from what earlier ones came to: vector (2,) and size in standard deviations.
+    """Return the departure of a reading from the fused earlier ones: vector (2,) and size in standard deviations.
 
     The covariance of the difference knows what the two have in common: an error of the same mount cancels.
     """
@@ -210,7 +210,7 @@ def departure_from(earlier: Direction, newest: Direction) -> tuple[Array, float]
 
 
 def departures_from(earlier: Sequence[Direction], newest: Stack) -> list[Departure]:
-    """The same of several stations."""
+    """Return ``departure_from`` of several stations."""
     differences = newest.lean - np.array([one.lean for one in earlier])
     apart = -stack_shared_errors(earlier, max(newest.shared.shape[2], *(one.width for one in earlier)))
     apart[:, :, : newest.shared.shape[2]] += newest.shared
@@ -221,7 +221,7 @@ def departures_from(earlier: Sequence[Direction], newest: Stack) -> list[Departu
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Why a station is held for moved, or not: departures in standard deviations."""
+    """Evidence that a station has moved: departures in standard deviations, own and of the neighbours."""
 
     own: float
     neighbours: tuple[float, ...]
@@ -229,7 +229,7 @@ class Evidence:
 
     @property
     def moved(self) -> bool:
-        """Whether earlier readings are to be dropped."""
+        """Whether the earlier readings are to be dropped."""
         return self.own > DEPARTED and self.agree
 
 
@@ -244,7 +244,7 @@ def moved_hole(station: Sequence[Direction], neighbours: Sequence[Sequence[Direc
 
 
 def judge_departure(departed: Departure, seen: Sequence[Departure]) -> Evidence:
-    """The same of departures already known; ``seen`` are those of the neighbours that have one."""
+    """Judge a known departure; ``seen`` are those of the neighbours that have one."""
     difference, own = departed
     agree = bool(seen) and all(size > DEPARTED and float(d @ difference) > 0.0 for d, size in seen)
     return Evidence(own, tuple(size for _, size in seen), agree)

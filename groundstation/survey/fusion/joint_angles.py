@@ -1,7 +1,7 @@
 """The angle at which each joint was made up, as the yaws of its two tubes tell it at rest: it does not change.
 
-The encoder's measurement goes down the string from tube to tube. Whoever changes it on its way, a tube that lies or
-one that slipped in its thread, turns the yaws of all tubes below and of none above: the yaws part at that joint.
+The encoder's measurement goes down the string from tube to tube. A tube that changes it on its way, because it lies or
+slipped in its thread, turns the yaws of all tubes below and of none above: the yaws part at that joint.
 The same happens where one tube takes a measurement of an encoder that has slipped and its neighbour does not.
 
 What all tubes have in common (the encoder, twist of the whole string) is in both yaws and cancels; so do the constant

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from groundstation.errors import SurveyError
 
 Array = npt.NDArray[np.float64]
-GRAVITY_TOLERANCE = 0.005  # of g, |f| of a stop that was no stop
+GRAVITY_TOLERANCE = 0.005  # of g, largest ||f| - g| of a stop at rest
 ASYMMETRY = 1e-9  # of the largest entry, rounding in the covariance of a node
 CONDITION = 1e14  # beyond it the inverse of a covariance is noise
 PLAINLY = 1e-10  # of the trace to the power k, the determinant (k, k) of a matrix that needs no closer look
@@ -28,7 +28,7 @@ SHORTEST_SETTLE = 16.0  # s, of the 32-point moving average
 
 
 class Quality(IntFlag):
-    """What is wrong with a stop; 0 is good."""
+    """Faults of a stop as flags; 0 is good."""
 
     GOOD = 0
     GRAVITY = 1  # |f| is not g
@@ -59,11 +59,11 @@ class Direction:
 
     @property
     def width(self) -> int:
-        """How many shared columns there are."""
+        """Number s of shared columns."""
         return int(self.shared.shape[1])
 
     def fill(self, columns: Array) -> None:
-        """Put the shared columns into zeros (2, s or more)."""
+        """Write the shared columns into ``columns``, zeros (2, >= s)."""
         columns[:, : self.width] = self.shared
 
     @property
@@ -110,7 +110,7 @@ def resolve_direction(force: Array, force_cov: Array, yaw: float, yaw_var: float
 
 
 def resolve_all(forces: Array, covs: Array, yaws: Sequence[float], yaw_vars: Sequence[float]) -> list[Resolved]:
-    """The same of many stops, (n, 3) and (n, 3, 3), bit for bit; raises where one of them cannot be resolved."""
+    """Return ``resolve_direction`` of stops (n, 3) and (n, 3, 3), equal bit for bit; raises if one of them fails."""
     sizes = np.sqrt((forces[:, None] @ forces[:, :, None])[:, 0, 0])
     for size, yaw in zip(sizes.tolist(), yaws, strict=True):
         if not math.isfinite(size) or size < 1e-3 or not math.isfinite(yaw):
@@ -152,7 +152,7 @@ def is_covariance(covs: Array) -> bool:
 
 
 def _is_plainly_one(cov: list[list[float]]) -> bool:
-    """Whether a matrix (k, k), k to 3, is far from being none: a few products in place of eigenvalues.
+    """Return whether a matrix (k, k), k <= 3, is a covariance by a wide margin: a few products instead of eigenvalues.
 
     The smallest eigenvalue is at least the determinant over the trace to the power k - 1.
     """
@@ -185,7 +185,7 @@ def angle_stds(lean: Array, down: float, cov: Array) -> tuple[float, float]:
 
 
 def angle_stds_of_all(leans: Array, downs: Sequence[float], covs: Array) -> list[tuple[float, float]]:
-    """The same of many directions, (n, 2) and (n, 2, 2)."""
+    """Return ``angle_stds`` of many directions: leans (n, 2), covariances (n, 2, 2)."""
     sizes = [math.hypot(x, y) for x, y in leans.tolist()]
     along = leans / np.array([size if size >= UPRIGHT else 1.0 for size in sizes])[:, None]
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
@@ -209,7 +209,7 @@ def combine_imus(forces: Array, covs: Array) -> tuple[Array, Array]:
     Raises
     ------
     SurveyError
-        When one of the covariances is none.
+        When one of the covariances is invalid.
     """
     if not is_covariance(covs):
         raise SurveyError(f"cluster: expected a positive definite force covariance of each IMU, got {covs.tolist()}")
@@ -228,7 +228,7 @@ def check_all(
     settle_times: Sequence[float],
     sample_std: float,
 ) -> list[Quality]:
-    """Quality of stops, (n, imus, 3) and (n, imus, 3, 3), with what the IMUs of each come to, (n, 3) and (n, 3, 3).
+    """Quality of stops, (n, imus, 3) and (n, imus, 3, 3), given the combined IMUs of each, (n, 3) and (n, 3, 3).
 
     ``sample_std`` (m/s^2) is the sensor's own noise in one sample.
     """

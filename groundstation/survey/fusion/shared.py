@@ -30,7 +30,7 @@ TRANSPORT = "transport"  # of columns that random errors share; they are of no k
 
 
 class StopDirection(Direction):
-    """Direction of one tube's stop. Its columns are made when they are asked for, out of what all of them come from.
+    """Direction of one tube's stop. Its shared columns are made on demand from the five columns of their causes.
 
     The mount, each joint and the three axes of the accelerometer: that is five columns, of which that of a joint stands
     at the place of every joint above. Fifty tubes share 250 errors, and a ground station keeps every reading.
@@ -61,12 +61,12 @@ class StopDirection(Direction):
         return columns
 
     def fill(self, columns: Array) -> None:
-        """Put the columns into zeros (2, s or more)."""
+        """Write the shared columns into ``columns``, zeros (2, >= s)."""
         put_columns(columns, self.causes, self.places)
 
     @property
     def information(self) -> Array:
-        """Inverse (2, 2) of ``total_cov``, worked out once."""
+        """Inverse (2, 2) of ``total_cov``, computed once."""
         known = self._information
         if known is None:
             known = super().information
@@ -75,7 +75,7 @@ class StopDirection(Direction):
 
 
 def put_columns(columns: Array, causes: Array, places: Places) -> None:
-    """Put the columns of a reading into zeros (2, s): mount, every joint alike, and the axes, from (2, 5)."""
+    """Write the columns of a reading into zeros (2, s): mount, every joint alike, and axes, from ``causes`` (2, 5)."""
     columns[:, places[0]] = causes[:, 0]
     columns[:, places[1:-AXES]] = causes[:, 1:2]
     columns[:, places[-AXES:]] = causes[:, -AXES:]
@@ -109,7 +109,7 @@ class Packed:
 
     @property
     def width(self) -> int:
-        """How many there are."""
+        """Number s of columns."""
         return self._width
 
     @property
@@ -119,23 +119,23 @@ class Packed:
 
     @property
     def values(self) -> Array:
-        """What stands there, (k, c)."""
+        """Columns (k, c) at ``places``."""
         return self._values
 
     def under(self, matrix: Array) -> Packed:
-        """What a matrix (j, k) makes of them: (j, s)."""
+        """Return the columns ``matrix`` (j, k) @ columns (k, s), of shape (j, s)."""
         made = Packed.__new__(Packed)
         made._places, made._values, made._width = self._places, matrix @ self._values, self._width
         return made
 
     def columns(self) -> Array:
-        """All of them (k, s), made anew."""
+        """Return all columns (k, s) in a new array."""
         columns = np.zeros((len(self._values), self._width))
         self.fill(columns)
         return columns
 
     def fill(self, columns: Array) -> None:
-        """Put them into zeros (k, s or more)."""
+        """Write the columns into ``columns``, zeros (k, >= s)."""
         columns[:, self._places] = self._values
 
 
@@ -162,16 +162,16 @@ class Fused(Direction):
 
     @property
     def packed(self) -> Packed:
-        """Columns as they are kept."""
+        """Shared columns as they are stored."""
         return self._packed
 
     @property
     def width(self) -> int:
-        """How many columns there are."""
+        """Number s of shared columns."""
         return self._packed.width
 
     def fill(self, columns: Array) -> None:
-        """Put the columns into zeros (2, s or more)."""
+        """Write the shared columns into ``columns``, zeros (2, >= s)."""
         self._packed.fill(columns)
 
 
@@ -288,7 +288,7 @@ def weigh_together(readings: Sequence[StopDirection]) -> None:
 
 
 def widen_shared_errors(shared: Array, columns: int) -> Array:
-    """The same columns with zeros for those met later: (k, columns)."""
+    """Return the columns (k, s) with zeros for the errors met later: (k, columns)."""
     missing = columns - shared.shape[1]
     return shared if missing == 0 else np.concatenate([shared, np.zeros((shared.shape[0], missing))], axis=1)
 

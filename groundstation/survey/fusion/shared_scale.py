@@ -21,7 +21,7 @@ MAD_TO_STD = 1.4826  # of a normal distribution
 
 @dataclass(frozen=True, slots=True)
 class SharedScale:
-    """Part ``by`` of every turn that the encoder shows less than all gyroscopes do, its sigma, and of how many."""
+    """Part ``by`` of every turn that the encoder counts less than all gyroscopes, its sigma, and their number."""
 
     by: float
     std: float
@@ -29,7 +29,7 @@ class SharedScale:
 
 
 def shared_scale(scales: Sequence[float]) -> SharedScale | None:
-    """What the scale errors of the nodes have in common, where that is beyond chance.
+    """Return the scale error common to the gyroscopes of all nodes, or None where it is within chance.
 
     Parameters
     ----------

@@ -29,18 +29,18 @@ ALONG, ACROSS = 1.5, UNKNOWN_YAW_VAR  # of the squared lean
 
 
 class Trust(IntEnum):
-    """How far a survey is believed; the larger number is the stricter."""
+    """Trust in a survey; the larger number is the stricter."""
 
     FULL = 0  # as its variances say
     UNKNOWN_YAW = 1  # fused with the variance of an unknown yaw, beside no survey that is trusted
     SET_ASIDE = 2  # kept and shown, never fused
-    UNDATED = 3  # its time is no rig time, so it has no depth
+    UNDATED = 3  # its time is not rig time, so it has no depth
 
 
 EFFECTS: dict[NodeFlag, Trust] = {
     NodeFlag.YAW_UNTRUSTED: Trust.UNKNOWN_YAW,
     NodeFlag.AIDING_OLD: Trust.FULL,  # the filter's variance has grown with the time since
-    NodeFlag.INNOVATION_REJECTED: Trust.UNKNOWN_YAW,  # the yaw or its aiding is wrong, nobody knows which
+    NodeFlag.INNOVATION_REJECTED: Trust.UNKNOWN_YAW,  # the yaw or its aiding is wrong, unknown which
     NodeFlag.RATE_EXCEEDED: Trust.UNKNOWN_YAW,
     NodeFlag.RESTORED: Trust.FULL,  # an aiding has confirmed the saved yaw since
     NodeFlag.CLOCK_UNSYNCHRONISED: Trust.UNDATED,
@@ -49,7 +49,7 @@ EFFECTS: dict[NodeFlag, Trust] = {
     NodeFlag.SENSOR_FAULT: Trust.SET_ASIDE,  # the force may be one that stands for a faulty sensor's
 }
 TOGETHER: dict[NodeFlag, Trust] = {
-    # a saved yaw that no aiding has confirmed: somebody may have turned the string while the power was off
+    # a saved yaw that no aiding has confirmed: the string may have been turned while the power was off
     NodeFlag.RESTORED | NodeFlag.AIDING_OLD: Trust.UNKNOWN_YAW,
 }
 STRANGE = Trust.SET_ASIDE  # of a flag that this version does not know
@@ -64,12 +64,12 @@ def trust_of(flags: NodeFlag) -> Trust:
 
 
 def with_unknown_yaw(resolved: Resolved) -> Resolved:
-    """The same stop with the covariance of a lean whose azimuth is not known."""
+    """Return the stop with the covariance of a lean of unknown azimuth."""
     return _spread(resolved, ALONG, ACROSS)
 
 
 def with_uncertain_yaw(resolved: Resolved, yaw_var: float) -> Resolved:
-    """The same stop where the whole variance of its yaw (rad^2) may take its lean off the straight line."""
+    """Return the stop with the covariance that its yaw variance (rad^2) adds beyond the linear term."""
     a = math.expm1(-yaw_var / 2.0)
     return _spread(resolved, a * a * (3.0 + 2.0 * a + a * a / 2.0), 0.0)  # without a difference of what is nearly equal
 

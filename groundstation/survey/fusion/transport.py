@@ -38,7 +38,7 @@ UNKNOWN_BEND = 1.0  # rad, how far the one leg there is may bend out of its arc
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """Direction of a station with the transport in it, and what that is with its standard deviation (rad)."""
+    """Direction of a station corrected for the transport, and the transport angle with its standard deviation (rad)."""
 
     direction: Direction
     gamma: float
@@ -95,7 +95,7 @@ def carry_directions(head: Direction, measured: Sequence[Direction], places: Seq
 
 
 def gamma_increments(leans: Array, downs: Array) -> Legs:
-    """How gamma grows from station to station, from leans (n + 1, 2) as measured and vertical parts (n + 1,)."""
+    """Return the growth of gamma between stations, from measured leans (n + 1, 2) and vertical parts (n + 1,)."""
     base = np.maximum(1.0 + downs, UPWARD)
     level = np.copysign(np.maximum(np.abs(downs), LEVEL), downs)
     lean = leans[:, 0] + 1j * leans[:, 1]
@@ -111,7 +111,7 @@ def gamma_increments(leans: Array, downs: Array) -> Legs:
 
 
 def gamma_bend_stds(tangents: Array, unseen: npt.NDArray[np.bool_]) -> Array:
-    """How far gamma is off by each leg (n,) between tangents (n + 1, 3), for it is no arc of a great circle; rad.
+    """Standard deviation (rad) of gamma over each leg (n,) between tangents (n + 1, 3), as legs are not great circles.
 
     A path that bends out of its arc evenly, as legs bend against each other, encloses c^2 / 12 of the angle by which it
     bends with an arc of length c: that is one standard deviation, to one side in all legs of a hole that goes on alike.

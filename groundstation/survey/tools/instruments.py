@@ -37,7 +37,7 @@ PREVIOUS = "previous"  # the azimuth weight of the station before, of drift and 
 
 
 class PropagationMode(Enum):
-    """How far an error stays the same."""
+    """Range over which an error stays the same."""
 
     RANDOM = "random"  # another one at every station
     SECTION = "section"  # the same from one initialisation of a gyro to the next, within a leg
@@ -71,7 +71,7 @@ class Term:
 
     @property
     def by_mode(self) -> bool:
-        """Whether it depends on the stations before: a gyro that initialises, drifts or walks."""
+        """Whether the term depends on the stations before: a gyro that initialises, drifts or walks."""
         return self.window != EVERYWHERE or self.kept or PREVIOUS in " ".join(self.weights).lower()
 
     @property
@@ -81,7 +81,7 @@ class Term:
 
     @property
     def formulas(self) -> tuple[str, ...]:
-        """All formulas: three weights, three singular ones, three of the position."""
+        """Nine formulas: three weights, three for a vertical hole, three of the position."""
         return (*self.weights, *(self.singular or ZERO), *(self.position or ZERO))
 
 
@@ -123,11 +123,11 @@ class SurveyTool:
                 raise ToolError(f"{self.name}: term {term.name}: {error}") from None
 
     def without(self, *names: str) -> SurveyTool:
-        """The same tool less some terms."""
+        """Return the tool less the terms of these names."""
         return self.with_terms(tuple(term for term in self.terms if term.name not in names))
 
     def with_terms(self, terms: tuple[Term, ...]) -> SurveyTool:
-        """The same tool with other terms."""
+        """Return the tool with ``terms`` in place of its own."""
         return replace(self, terms=terms)
 
 
@@ -216,7 +216,7 @@ def parse_toml(text: str, where: str, replaced: Mapping[str, float] | None = Non
 
 
 def with_parameters(own: dict[str, float], given: Mapping[str, float]) -> dict[str, float]:
-    """Parameters of a file with what was given in their place or beside them."""
+    """Return the parameters of a file, replaced or completed by ``given``."""
     names = {normalise_name(name) for name in given}
     return {name: value for name, value in own.items() if normalise_name(name) not in names} | dict(given)
 

@@ -20,7 +20,7 @@ TOE = 0.05  # m, by which a column may end above the depth asked for: its last l
 
 
 class ColumnState(IntEnum):
-    """What is known of a column at a depth."""
+    """State of a column at a depth."""
 
     SURVEYED = 0
     UNSURVEYED = 1  # drilled, but below its last survey: extrapolated
@@ -121,12 +121,12 @@ class Cut:
     slope: Array
 
     def in_plane(self, errors: Array) -> Array:
-        """What errors (w, n, 3, k) of the stations do in a plane (w, n, 2, k): along its normal by the hole's slope."""
+        """Errors (w, n, 3, k) of stations projected into the plane (w, n, 2, k), along the hole's slope."""
         return errors[..., :2, :] - self.slope[..., :, None] * errors[..., 2:, :]
 
 
 def intersect_planes(positions: Array, tangents: Array, depths: Array) -> Cut:
-    """Where wells cross the planes of ``depths`` (z,), in a frame whose third axis is the normal of the planes.
+    """Cut wells by the planes of ``depths`` (z,), in a frame whose third axis is the normal of the planes.
 
     Positions and tangents (w, n, 3). Between stations the centre follows the cubic that has the stations' places and
     slopes.

@@ -23,7 +23,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ClosingDay:
-    """What stood at the end of one day."""
+    """State of the wall at the end of one day."""
 
     day: date
     drilled: list[str]  # columns of that day
@@ -39,7 +39,7 @@ def closing_by_day(
     days: Sequence[date | None],
     detours: Sequence[Detour] = (),
 ) -> list[ClosingDay]:
-    """What stood at the end of every day on which something was drilled.
+    """Return the state of the wall at the end of every day of drilling.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def closing_by_day(
 
 
 def _closing(columns: Columns, pairs: npt.NDArray[np.intp], required: float, order: Array) -> tuple[Array, Array]:
-    """Distance (joints, depths) of both centres, and the day on which the joint is there; infinite where never."""
+    """Distance (joints, depths) of both centres, m, and the day on which the joint exists (infinite: never)."""
     a, b = pairs[:, 0], pairs[:, 1]
     apart = columns.centres[b] - columns.centres[a]
     distance = np.hypot(apart[..., 0], apart[..., 1])

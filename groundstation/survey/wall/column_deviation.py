@@ -116,7 +116,7 @@ class ColumnDesign:
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """Where the column is against its design at one point."""
+    """Deviation of a column from its design at one point."""
 
     md: float
     along: float  # m along the design axis
@@ -150,7 +150,7 @@ class Deviation:
 
 @dataclass(frozen=True, slots=True)
 class Deviations:
-    """Deviations of points along a hole, numbers side by side: each is an object where somebody looks at it."""
+    """Deviations of points along a hole as columns of numbers; an index makes an object of one row."""
 
     md: Array  # (n,)
     along: Array  # (n,)
@@ -170,7 +170,7 @@ class Deviations:
         return (Deviation(*row) for row in rows)
 
     def worst(self, first: int = 0) -> Deviation | None:
-        """The worst from a place on, by the share of the tolerance used, the first of equals; None of none."""
+        """Deviation with the largest share of its tolerance from index ``first`` on, first of equals; None if empty."""
         limit = self.limit[first:]
         size = np.hypot(self.offset[first:, 0], self.offset[first:, 1])
         infinite = np.where(size > 0.0, np.inf, 0.0)
@@ -231,7 +231,7 @@ def _root(cov: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Dominant:
-    """Which angle the position of a column hangs on: lateral error (m) of each, over its length."""
+    """Lateral errors (m) of a column over its length, by the error of each angle."""
 
     by_inclination: float
     by_azimuth: float

@@ -42,7 +42,7 @@ def joint_thickness(distance: Array, radius: Array | float, other: Array | float
 
 
 def limit_distances(radius: Array, other: Array, required: float) -> Array:
-    """Distance (m) at which the joint of two columns is just as thick as required; 0 where they never make such one."""
+    """Distance (m) at which the joint of two columns is as thick as required; 0 where it never can be."""
     half = 0.25 * required**2
     first, second = radius**2 - half, other**2 - half
     found = np.sqrt(np.maximum(first, 0.0)) + np.sqrt(np.maximum(second, 0.0))
@@ -63,7 +63,7 @@ def largest_distance(radius: float, required: float) -> float:
 
 
 def shift_margin(radius: float, required: float, spacing: float, length: float) -> tuple[float, float]:
-    """How far (m) one centre may shift along the wall, and how much (rad) a column of ``length`` then deviates."""
+    """Largest shift (m) of a centre along the wall, and the deviation (rad) of a column of ``length`` by it."""
     shift = largest_distance(radius, required) - spacing
     return shift, math.atan2(shift, length)
 
@@ -139,7 +139,7 @@ def _over_radii(mean: Array, cov: Array, radii: Array, radius_cov: Array, requir
 
 
 def _directions(radii: Array, radius_cov: Array, required: float) -> tuple[Array, Array]:
-    """One standard deviation (n, 2) of the radii along the steepest change of the limit, and what is left across it."""
+    """One standard deviation (n, 2) of the radii along the steepest change of the limit, and the rest across it."""
     half = 0.25 * required**2
     gradient = radii / np.sqrt(np.maximum(radii**2 - half, 1e-6 * radii**2))
     towards = np.einsum("nij,nj->ni", radius_cov, gradient)
@@ -151,7 +151,7 @@ def _directions(radii: Array, radius_cov: Array, required: float) -> tuple[Array
 
 
 def _step(mean: Array, cov: Array, radii: Array, main: Array, required: float) -> tuple[Array, Array]:
-    """Where along ``main`` (standard deviations) the joint is just thick enough, and how wide that change is."""
+    """Place along ``main`` (standard deviations) of a joint as thick as required, and the width of that change."""
     distance = np.hypot(mean[:, 0], mean[:, 1])
     low, high = np.full(len(mean), -RADIUS_REACH), np.full(len(mean), RADIUS_REACH)
     for _ in range(40):

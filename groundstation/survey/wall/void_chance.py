@@ -114,7 +114,7 @@ def _as_surveyed(columns: Columns, three: list[int], near: list[int]) -> npt.NDA
 def void_point(
     errors: WallErrors, triple: npt.NDArray[np.intp], near: list[int], depths: npt.NDArray[np.intp]
 ) -> MostProbablePoint | None:
-    """The same for the point between three columns, at the likeliest of some ``depths``."""
+    """Most probable point of a void between three columns, at the likeliest of some ``depths``; None if none."""
     c = errors.columns
     centres, radii = np.swapaxes(c.centres[triple][:, depths], 0, 1), c.radii[triple][:, depths].T
     middle = power_centre(centres, radii)
@@ -155,7 +155,7 @@ def _void_point_at(
 
 
 def _away(errors: WallErrors, column: int, depth: int, middle: Array) -> Array:
-    """How much more a column covers a point for one standard deviation of each number: it comes nearer, or is wider."""
+    """Change of a column's cover of a point for one standard deviation of each number: it nears, or is wider."""
     c = errors.columns
     away = middle - c.centres[column, depth]
     unit = away / max(float(np.hypot(*away)), 1e-9)
@@ -167,7 +167,7 @@ def _away(errors: WallErrors, column: int, depth: int, middle: Array) -> Array:
 
 
 def _depth_in(columns: Columns, column: int, depth: int, point: Array) -> float:
-    """How deep (m) a point lies in a column; negative outside."""
+    """Depth (m) of a point inside a column; negative outside."""
     away = point - columns.centres[column, depth]
     return float(columns.radii[column, depth] - np.hypot(away[0], away[1]))
 

@@ -74,7 +74,7 @@ def _exposed(disc: int, present: npt.NDArray[np.intp], centres: Array, radii: Ar
 
 
 def _between(disc: int, covered: list[tuple[float, float, int]]) -> list[Arc]:
-    """What intervals (begin, length, disc), in order of their begin, leave of the circle."""
+    """Arcs of a circle left free by intervals (begin, length, disc) in order of their begin."""
     reach = max(begin + length - math.tau for begin, length, _ in covered)
     arcs = []
     for begin, length, other in covered:

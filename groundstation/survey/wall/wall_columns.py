@@ -32,7 +32,7 @@ AT_ONCE = 256  # columns that are computed together: thousands would need hundre
 
 
 class ColumnStatus(Enum):
-    """What the site says of a column."""
+    """Status of a column on the site."""
 
     UNSTATED = ""  # as far as it was surveyed
     PLANNED = "planned"  # to be drilled
@@ -42,7 +42,7 @@ class ColumnStatus(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ColumnPlan:
-    """One column: what it is to be, who surveyed it, how far it was drilled."""
+    """Plan of one column: its design, the tool that surveyed it, the depth drilled."""
 
     design: ColumnDesign
     tool: SurveyTool
@@ -73,7 +73,7 @@ class Layer:
 
 @dataclass(frozen=True, slots=True)
 class Assumptions:
-    """What holds for the whole wall."""
+    """Assumptions for the whole wall."""
 
     method: Method = Method.BALANCED_TANGENTIAL
     site: Site = field(default_factory=Site)
@@ -244,11 +244,11 @@ class _Book:
         self._shared: list[tuple[list[int], Array]] = [([], np.zeros((1, 2, 0)))] * count  # and their numbers
 
     def cut(self, columns: list[int], upper: npt.NDArray[np.intp], share: Array) -> None:
-        """Say between which stations planes cut some columns."""
+        """Store the stations between which planes cut some columns."""
         self._upper[columns], self._share[columns] = upper, share
 
     def add(self, column: int, key: str | None, errors: Array) -> None:
-        """Errors (stations, 2, m) of one column."""
+        """Add errors (stations, 2, m) of one column, shared under ``key`` or its own (None)."""
         own, shared = self._open.setdefault(column, ([], {}))
         if key is None:
             own.append(errors)
@@ -257,7 +257,7 @@ class _Book:
         shared[number] = shared[number] + errors[..., 0] if number in shared else errors[..., 0]
 
     def close(self) -> None:
-        """All errors of the columns so far have come: their own become as few numbers as say the same."""
+        """Finish the columns added so far: their own errors become as few numbers as have the same covariance."""
         for k, (own, shared) in self._open.items():
             stations = len(own[0] if own else next(iter(shared.values())))
             self._own[k] = reduce_error_columns(np.concatenate([np.zeros((stations, 2, 0)), *own], axis=-1))
@@ -326,7 +326,7 @@ def _states(
 
 
 def _design_centres(design: ColumnDesign, frame: Array, depths: Array) -> Array:
-    """Where a design axis crosses the planes (depths, 2)."""
+    """Points (depths, 2) at which a design axis crosses the planes."""
     head, axis = frame @ np.array(design.head), frame @ design.axis
     if axis[2] < FLATTEST:
         raise SurveyError(

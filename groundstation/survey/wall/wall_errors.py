@@ -42,7 +42,7 @@ class MostProbablePoint(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class WallErrors:
-    """Where each standard normal number acts: those shared, of each column alone, of radii by column and layer."""
+    """Layout of the standard normal numbers: shared ones, those of each column, those of radii by column and layer."""
 
     columns: Columns
     shared: int
@@ -51,29 +51,29 @@ class WallErrors:
 
     @classmethod
     def of(cls, columns: Columns) -> WallErrors:
-        """The errors of some columns."""
+        """Return the errors of some columns."""
         return cls(columns, columns.shared.width, columns.own.width, int(columns.depth_layers().max()) + 1)
 
     def among(self, which: Sequence[int]) -> WallErrors:
-        """The errors of a few columns, numbered anew; ``numbers`` says which of all they are."""
+        """Return the errors of a few columns, renumbered; ``numbers`` maps them to all."""
         return WallErrors(self.columns.subset(np.asarray(which, np.intp)), self.shared, self.own, self.layers)
 
     def numbers(self, which: Sequence[int]) -> Indices:
-        """Place among all numbers of those that a few columns have, in the order of ``among``."""
+        """Index among all numbers of those that a few columns have, in the order of ``among``."""
         own = [np.arange(self.own_slice(k).start, self.own_slice(k).stop) for k in which]
         radii = [np.arange(self.layers) + self.radius_index(k, 0) for k in which]
         common = np.arange(self.layers) + self.common_index(0)
         return np.concatenate([np.arange(self.shared), *own, *radii, common]).astype(np.intp)
 
     def places(self, which: Indices) -> Indices:
-        """Place of every column among some that are ``drawn``."""
+        """Index of every column among some that are ``drawn``."""
         out = np.zeros(len(self.columns.names), np.intp)
         out[which] = np.arange(len(which))
         return out
 
     @property
     def size(self) -> int:
-        """How many numbers there are."""
+        """Count of numbers."""
         return self.shared + len(self.columns.names) * (self.own + self.layers) + self.layers
 
     def own_slice(self, column: int) -> slice:
@@ -82,11 +82,11 @@ class WallErrors:
         return slice(begin, begin + self.own)
 
     def radius_index(self, column: int, layer: int) -> int:
-        """Number of the radius of one column in a layer."""
+        """Index of the number of a column's radius in a layer."""
         return self.shared + len(self.columns.names) * self.own + column * self.layers + layer
 
     def common_index(self, layer: int) -> int:
-        """Number of what all radii in a layer share."""
+        """Index of the number that all radii in a layer share."""
         return self.shared + len(self.columns.names) * (self.own + self.layers) + layer
 
     def drawn(self, x: Array, which: Indices) -> tuple[Array, Array]:
@@ -122,7 +122,7 @@ def batch_groups(groups: Sequence[Sequence[int]], samples: int, depths: int) -> 
 
 
 def add_radius(errors: WallErrors, normal: Array, column: int, depth: int, slope: float) -> None:
-    """What the radius of a column adds to a normal: ``slope`` (m/m)."""
+    """Add the part of a column's radius to a normal: ``slope`` (m/m)."""
     c, layer = errors.columns, int(errors.columns.depth_layers()[depth])
     change, rho = slope * float(c.radius_stds[column, depth]), c.radius_correlation
     normal[errors.common_index(layer)] += change * math.sqrt(rho)

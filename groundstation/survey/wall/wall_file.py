@@ -87,7 +87,7 @@ class WallFile:
 
     @property
     def defaults(self) -> Defaults:
-        """What columns take that do not say otherwise."""
+        """Values for columns that state none of their own."""
         return Defaults(
             self.radius, self.length, self.inclination, self.azimuth, self.tolerance, self.tool, self.serial,
             self.head_std, self.path.parent, self.calibration,
@@ -114,7 +114,7 @@ class Wall:
 
     @property
     def stages(self) -> list[ClosingDay]:
-        """How it closed, day by day; none where no day of drilling is stated."""
+        """Closing of the wall day by day; empty where no day of drilling is stated."""
         return closing_by_day(self.columns, self.pairs, self.file.thickness, self.drilled_on, self.detours)
 
     @property

@@ -38,7 +38,7 @@ def judge_joints(columns: Columns, pairs: npt.NDArray[np.intp], required: float)
 
 
 def _joints(columns: Columns, pairs: npt.NDArray[np.intp], required: float) -> Joints:
-    """Judge some of them."""
+    """Judge some pairs of columns at every depth."""
     a, b = pairs[:, 0], pairs[:, 1]
     apart = columns.centres[b] - columns.centres[a]
     distance = np.hypot(apart[..., 0], apart[..., 1])
@@ -126,7 +126,7 @@ def worst_joint(found: Joints) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class ExtraColumn:
-    """Where one more column would close an opening, and whether it would. Axes of the plane, m."""
+    """Place of one more column at an opening, and whether it would close it. Axes of the plane, m."""
 
     north: float
     east: float

@@ -94,7 +94,7 @@ def system_probability(
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """What has to be sampled: the columns that matter, and joints and triples by their index among them."""
+    """Scope of the sampling: the columns that matter, and joints and triples by their index among them."""
 
     columns: Columns
     pairs: npt.NDArray[np.intp]  # (joints, 2)
@@ -105,7 +105,7 @@ class _Asked:
 
     @property
     def cost(self) -> int:
-        """What a sample costs at one depth: what is drawn and what is asked of it."""
+        """Relative cost of a sample at one depth: numbers drawn plus tests made."""
         return len(self.pairs) + sum(2 + len(near) for near in self.nearby) + len(self.columns.names)
 
     @classmethod
@@ -155,7 +155,7 @@ def _design_points(errors: WallErrors, asked: _Asked, required: float) -> list[M
 
 
 def _joint_point(errors: WallErrors, pair: npt.NDArray[np.intp], depth: int, required: float) -> MostProbablePoint:
-    """Most likely point at which a joint is just too thin, and about how likely it is."""
+    """Most probable point at which a joint becomes too thin, and its approximate chance."""
     both = pair.tolist()
     two = errors.among(both)
     c = two.columns

@@ -33,7 +33,7 @@ WORDS = ("state", "instrument", "serial", "calibration", "tolerance", "between",
 
 @dataclass(frozen=True, slots=True)
 class Defaults:
-    """What a column takes that does not say otherwise; m and rad."""
+    """Values of a column that states none of its own; m and rad."""
 
     radius: float
     length: float | None
@@ -51,7 +51,7 @@ class Defaults:
 
 @dataclass(frozen=True, slots=True)
 class Remedy:
-    """What a remedial column is there for."""
+    """Purpose of a remedial column."""
 
     between: tuple[str, ...] = ()
     replaces: str = ""

@@ -32,7 +32,7 @@ DIAGONAL = 1.75  # spacings within which three columns may have a void between t
 
 
 class WallVerdict(Enum):
-    """What may be signed."""
+    """Verdict that may be signed."""
 
     TIGHT = "tight"
     NOT_PROVEN = "not proven"  # nothing is open, but something is not known well enough
@@ -40,7 +40,7 @@ class WallVerdict(Enum):
 
 
 class FindingKind(Enum):
-    """Why a wall is not tight, or not proven so."""
+    """Reason for which a wall is not tight, or not proven tight."""
 
     MISSING = "missing"  # no column where one is required
     UNSURVEYED = "unsurveyed"
@@ -56,7 +56,7 @@ OPEN = (FindingKind.MISSING, FindingKind.THIN, FindingKind.VOID, FindingKind.CRO
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One reason, with its place."""
+    """One reason of the verdict, with its place."""
 
     kind: FindingKind
     what: str  # column, joint, or columns around a void
@@ -76,7 +76,7 @@ class VoidFinding:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """All that was found."""
+    """Verdict on a wall with all its findings."""
 
     verdict: WallVerdict
     findings: list[Finding]
@@ -195,7 +195,7 @@ def _voids(columns: Columns) -> list[VoidFinding]:
 
 
 def _void_findings(columns: Columns, holes: list[VoidFinding]) -> list[Finding]:
-    """One finding for the same columns around it, over the depths at which it is there."""
+    """One finding for each set of columns around a void, over the depths of the void."""
     around: dict[tuple[int, ...], list[VoidFinding]] = {}
     for hole in holes:
         around.setdefault(hole.void.columns, []).append(hole)
@@ -216,7 +216,7 @@ def _void_findings(columns: Columns, holes: list[VoidFinding]) -> list[Finding]:
 def _likely_voids(
     columns: Columns, holes: list[VoidFinding], chance: VoidChance | None, allowed: float
 ) -> list[Finding]:
-    """Where there is no void as surveyed, yet one is more likely than allowed."""
+    """Findings of voids that are not there as surveyed, yet more probable than allowed."""
     if chance is None:
         return []
     known = np.isin(columns.depths, [hole.depth for hole in holes]) | np.any(

@@ -118,7 +118,7 @@ def _between(columns: Sequence[ErrorColumns], leg: npt.NDArray[np.int64], fracti
 
 
 def _aside(hole: ClearanceHole) -> Array:
-    """A direction (n, 3) across each station, for where two holes meet."""
+    """Unit vector (n, 3) across each station, for holes that meet."""
     inclination, azimuth = hole.survey.inclination, hole.survey.azimuth
     return np.stack([-np.sin(azimuth), np.cos(azimuth), np.zeros_like(inclination)], axis=-1)
 

@@ -126,7 +126,7 @@ class CompiledModel:
         return places, cov
 
     def _refuse(self, status: int, survey: WellSurvey, site: Site, where: str = "") -> NoReturn:
-        """Say what is wrong with the station at which the loop ended."""
+        """Raise the error of the station at which the loop ended."""
         if status > 0:
             raise SurveyError(f"survey: {where}station {status}: the hole turns straight back on itself")
         propagate_errors(survey, [Leg(self.tool)], site)  # names the term
@@ -178,7 +178,7 @@ def _model(tool: SurveyTool, *, by_source: bool) -> CompiledModel:
 def preload_models(names: Sequence[str] = COMPILED_BEFORE) -> None:
     """Compile instruments or load them from the cache, totals and sources, and hold them.
 
-    Nobody's first survey waits for them then, and short surveys by them run compiled too.
+    The first survey does not wait for them then, and short surveys by them run compiled too.
     """
     md, zero = np.arange(3.0), np.zeros(3)
     for name in names:
@@ -265,7 +265,7 @@ def _load(source: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".new", delete=False) as fresh:
             fresh.write(source)
-        Path(fresh.name).replace(path)  # whoever writes it beside us writes the same
+        Path(fresh.name).replace(path)  # another process that writes it meanwhile writes the same
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise ToolError(f"{path}: the compiled model cannot be loaded; remove the file")

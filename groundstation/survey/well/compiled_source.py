@@ -131,7 +131,7 @@ PAIRS = (("x", "x"), ("x", "y"), ("y", "y"), ("x", "z"), ("y", "z"), ("z", "z"))
 
 
 def loop_sources(tool: SurveyTool, *, by_source: bool) -> list[ErrorSource]:
-    """Sources of a loop: all of them, or those with one formula as one."""
+    """Error sources of a loop: all of them, or those with one formula merged."""
     legs = (Leg(tool),)
     return sources_of(legs) if by_source else merged_sources(legs)
 
@@ -165,7 +165,7 @@ def write_model(tool: SurveyTool, *, by_source: bool = False) -> str:
 
 
 def _parted(lines: list[str], fixed: set[str]) -> tuple[list[str], list[str]]:
-    """Assignments that every station would repeat, and the others; ``fixed`` are inputs that stay the same.
+    """Assignments that every station would repeat, and the others; ``fixed`` are the inputs that do not change.
 
     The compiler moves sums out of the loop by itself, but no call of a tangent.
     """
@@ -183,7 +183,7 @@ def _parted(lines: list[str], fixed: set[str]) -> tuple[list[str], list[str]]:
 def _source_code(
     n: int, source: ErrorSource, tokens: list[str], *, by_source: bool
 ) -> tuple[list[str], list[str], list[str]]:
-    """Lines of one source: its state, what a station does with it, and what it leaves to the next."""
+    """Lines of one source: its state, its work at a station, and what it passes to the next."""
     _, _, term = source.rows[0]
     axes, sigma = AXES[: source.axes], repr(term.sigma)
     pairs = [(k, a, b) for k, (a, b) in enumerate(PAIRS) if a in axes and b in axes]

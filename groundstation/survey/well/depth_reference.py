@@ -24,18 +24,18 @@ DEPTHS_FROM = (*GROUND, *RIG, "mean-sea-level", "height-datum")
 
 @dataclass(frozen=True, slots=True)
 class DepthReference:
-    """What the depths of a record and those of the answer count from."""
+    """References of the depths of a record and of those of the answer."""
 
     record: str = DEPTHS_FROM[0]
     answer: str = DEPTHS_FROM[0]
     height: float = 0.0  # of the record's above the answer's
 
     def to_answer(self, depth: Depths) -> Depths:
-        """A depth of the record, as the answer counts."""
+        """Convert a depth of the record to one of the answer, m."""
         return depth - self.height
 
     def to_record(self, depth: Depths) -> Depths:
-        """A depth of the answer, as the record counts."""
+        """Convert a depth of the answer to one of the record, m."""
         return depth + self.height
 
 

@@ -69,7 +69,7 @@ def plan_ellipse(cov: Array, sigma: float = 1.0) -> Ellipse:
 
 
 def plan_ellipses(covs: Array, sigma: float = 1.0) -> list[Ellipse]:
-    """The same of many covariances (n, 3, 3) or (n, 2, 2)."""
+    """Return ``plan_ellipse`` of many covariances (n, 3, 3) or (n, 2, 2)."""
     values, vectors = np.linalg.eigh(covs[:, :2, :2])
     semi = sigma * np.sqrt(np.maximum(values, 0.0))
     azimuths = np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1]) % math.pi

@@ -129,7 +129,7 @@ class Propagation:
             raise ToolError(f"{tool}: term {term.name}: its weight has no value at a station; give singular weights")
 
     def _lost(self, term: Term, flat: list[Any]) -> bool:
-        """Whether a weight has no value where the hole is vertical and nothing stands for it."""
+        """Whether a weight has no value where the hole is vertical, without a singular form in its place."""
         if term.singular is not None:
             return False
         vertical = self._geometry.vertical
@@ -152,7 +152,7 @@ class Propagation:
 
 
 def _summed(inner: Array, last: Array) -> Array:
-    """Effect of what stays the same: of all stations before with both legs, and of the last; both are used up."""
+    """Effect of a constant error: of all earlier stations with both legs, and of the last; overwrites both arrays."""
     np.cumsum(inner, axis=-1, out=inner)
     last[..., 1:] += inner[..., :-1]
     return last

@@ -36,7 +36,7 @@ SECONDS_A_METRE = 50.0  # of a survey whose record has no times: thesis, 100 s f
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """What formulas know of the place; SI and rad, nT."""
+    """Properties of the place that formulas use; SI and rad, nT."""
 
     gravity: float = 9.81
     b_field: float = 50_000.0
@@ -100,7 +100,7 @@ def station_values(survey: WellSurvey, site: Site) -> dict[str, Array]:
 
 
 class SurveyGeometry:
-    """What propagation needs of a survey, once for all sources: (..., n - 1) and lengths in m.
+    """Geometry of a survey for propagation, computed once for all sources: (..., n - 1), lengths in m.
 
     From revision 5 the industry's model allows the direction at the surface an error like that of the first station:
     ``slot_allowance`` gives the first station the whole first leg.
@@ -150,7 +150,7 @@ def sources_of(legs: tuple[Leg, ...]) -> list[ErrorSource]:
 
 @lru_cache(maxsize=64)
 def merged_sources(legs: tuple[Leg, ...]) -> list[ErrorSource]:
-    """The same sources for their sum alone: those with one formula are one, its variance the sum of theirs."""
+    """Return the sources merged for their sum alone: those with one formula are one, its variance the sum of theirs."""
     found: dict[Any, list[ErrorSource]] = {}
     for k, source in enumerate(sources_of(legs)):
         number, _, term = source.rows[0]

@@ -24,7 +24,7 @@ OPPOSITE = 1e-6  # rad, of two tangents, short of which an arc between them is n
 
 
 class Method(Enum):
-    """How a leg follows from the directions at its ends."""
+    """Shape of a leg between the directions at its ends."""
 
     TANGENTIAL = "tangential"
     BALANCED_TANGENTIAL = "balanced-tangential"
@@ -81,7 +81,7 @@ def leg_displacement(m: Any, method: Method, length: Any, i1: Any, a1: Any, i2: 
 
 
 def _where_leaning(m: Any, inclination: Any, azimuth: Any, other: Any) -> Any:
-    """Azimuth of an end of a leg; that of a vertical end means nothing, the other end's stands for it."""
+    """Azimuth of an end of a leg; that of the other end where this one is vertical."""
     if m is math:
         return azimuth if abs(math.sin(inclination)) > NO_LEAN else other
     return np.where(np.abs(np.sin(inclination)) > NO_LEAN, azimuth, other)
@@ -118,7 +118,7 @@ def check_stations(md: Array, inclination: Array, azimuth: Array, where: str = "
 
 
 def _is_survey(md: Array, inclination: Array, azimuth: Array) -> bool:
-    """Whether all is well: which station is not is looked for only where one is not."""
+    """Whether all stations are valid; the invalid one is searched for only if not."""
     return bool(
         inclination.size
         and inclination.min() >= 0.0

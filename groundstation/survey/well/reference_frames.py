@@ -77,7 +77,7 @@ class ReferenceFrame:
 
 @dataclass(frozen=True, slots=True)
 class TieOn:
-    """Where a survey begins that does not begin at its collar; north and depths as the record counts them."""
+    """First station of a survey that does not begin at its collar; north and depths as in the record."""
 
     md: float
     inclination: float

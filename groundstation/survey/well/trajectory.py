@@ -62,7 +62,7 @@ GROWTH = 8  # share of its rows by which a table grows
 
 @dataclass(frozen=True, slots=True)
 class TrajectorySums:
-    """What a hole has come to at a station: the running sums of the kernel, and the length of the last leg (m)."""
+    """Running sums of the error kernel at a station, and the length of the last leg (m)."""
 
     own: Array  # (3, 3)
     passed: Array  # (3, s)
@@ -71,7 +71,7 @@ class TrajectorySums:
 
 @dataclass(frozen=True, slots=True)
 class Followed:
-    """What comes of going down a part of a hole."""
+    """Result of following a part of a hole down."""
 
     sums: TrajectorySums  # at its end
     marks: list[TrajectorySums]  # after every `BLOCK` stations of the hole
@@ -112,7 +112,7 @@ class Trajectory:
         self._marks = [self._sums]  # at the collar and every BLOCK stations from there
 
     def __len__(self) -> int:
-        """How many points there are."""
+        """Number of points."""
         return len(self._directions)
 
     def __getitem__(self, place: int) -> TrajectoryPoint:
@@ -209,7 +209,7 @@ class Trajectory:
             yield from self._follow(mark, begin, min(begin + BLOCK, len(self) - 1), with_columns=True).runs
 
     def _insert(self, place: int, md: float, direction: Direction) -> None:
-        """Have a row for a station; what follows from its direction is not in it yet."""
+        """Insert a row for a station; what follows from its direction is not in it yet."""
         known, count = self._rows, len(self)
         if count == len(known):
             self._rows = np.zeros(count + 1 + count // GROWTH, ROW)
@@ -221,7 +221,7 @@ class Trajectory:
         self._down.insert(place, NOTHING)
 
     def _direct(self, places: Sequence[int]) -> None:
-        """Work out what follows from the directions at some places by themselves."""
+        """Compute the rows at some places that depend on their own direction alone."""
         if not places:
             return
         directions = [self._directions[place] for place in places]
@@ -237,7 +237,7 @@ class Trajectory:
         rows["count"][at] = [len(self._columns[place].places) for place in places]
 
     def _draw(self, first: int) -> None:
-        """Work out the positions from a place on."""
+        """Compute the positions from a place on."""
         begin = first - 1
         if begin < len(self._kept) - 1:
             begin -= begin % BLOCK
@@ -255,9 +255,9 @@ class Trajectory:
             self._kept += [UNKNOWN] * (len(rows) - 1)
 
     def _follow(self, sums: TrajectorySums, begin: int, end: int, *, with_columns: bool) -> Followed:
-        """Go on with sums from one place to another."""
+        """Continue ``sums`` from one place to another."""
         from groundstation.survey.well.kernels.position_errors import (
-            add_stations,  # whoever only reads needs no compiler
+            add_stations,  # reading alone needs no compiler
         )
 
         rows, columns = self._rows[begin : end + 1], self._columns[begin : end + 1]

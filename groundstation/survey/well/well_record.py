@@ -12,7 +12,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class SurveyRecord:
-    """A survey as read: (n,) m, rad and rad; ``lines`` are those of the file, ``columns`` what else it holds."""
+    """A survey as read: (n,) m, rad and rad; ``lines`` are those of the file, ``columns`` its further columns."""
 
     md: Array
     inclination: Array

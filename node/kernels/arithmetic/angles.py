@@ -6,15 +6,15 @@ import math
 from typing import Final
 
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.operations import number
-from node.kernels.arithmetic.quantity import angle as of_angle
+from node.kernels.arithmetic.operations import as_number
+from node.kernels.arithmetic.quantity import angle_quantity as of_angle
 
 HALF_TURN: Final = of_angle(math.pi)
 WHOLE_TURN: Final = of_angle(2.0 * math.pi)
 
 
 @kernel
-def wrap(angle: float) -> float:
+def wrap_angle(angle: float) -> float:
     """Angle (rad) in (-pi, pi]."""
     return HALF_TURN - (HALF_TURN - angle) % WHOLE_TURN
 
@@ -23,7 +23,7 @@ def wrap(angle: float) -> float:
 def wrap_positive(angle: float) -> float:
     """Angle (rad) in [0, 2 pi)."""
     wrapped = angle % WHOLE_TURN
-    return number(wrapped) if wrapped < WHOLE_TURN else 0
+    return as_number(wrapped) if wrapped < WHOLE_TURN else 0
 
 
 @kernel

@@ -19,13 +19,13 @@ ROOTS: Final = np.array([0] * 64 + [round(2.0**30 / math.sqrt((k + 0.5) / 256.0)
 
 
 @kernel
-def mul(wide: int, factor: int) -> int:
+def multiply_q31(wide: int, factor: int) -> int:
     """A k 2^-31 to the nearest, |a| < 2^62, |k| <= 2^31."""
     return (wide >> 31) * factor + (((wide & LOW31) * factor + HALF31) >> 31)
 
 
 @kernel
-def shift(value: int, right: int) -> int:
+def rounded_shift(value: int, right: int) -> int:
     """A 2^-right to the nearest; a negative ``right`` (at least -62) shifts left, and the result must fit."""
     if right <= 0:
         return value << -right
@@ -35,7 +35,7 @@ def shift(value: int, right: int) -> int:
 
 
 @kernel
-def clamp(record: Any, value: int, limit: int) -> int:
+def clamp_and_count(record: Any, value: int, limit: int) -> int:
     """``value`` held within -limit..limit; what did not fit is counted in ``record.overflows``."""
     if value > limit:
         record.overflows += 1
@@ -47,7 +47,7 @@ def clamp(record: Any, value: int, limit: int) -> int:
 
 
 @kernel
-def bits(value: int) -> int:
+def bit_length(value: int) -> int:
     """Number of bits of ``value`` >= 0, 0 of 0."""
     count = 0
     for step in (32, 16, 8, 4, 2, 1):
@@ -58,9 +58,9 @@ def bits(value: int) -> int:
 
 
 @kernel
-def reciprocal(value: int) -> tuple[int, int]:
+def reciprocal_parts(value: int) -> tuple[int, int]:
     """Mantissa m in (2^30, 2^31] and exponent e with 1 / value = m 2^(-61 - e), value > 0."""
-    exponent = bits(value) - 31
+    exponent = bit_length(value) - 31
     return (1 << 61) // shift_down(value, exponent), exponent
 
 
@@ -71,10 +71,10 @@ def shift_down(value: int, right: int) -> int:
 
 
 @kernel
-def quotient(wide: int, divisor: int) -> int:
+def quotient_q30(wide: int, divisor: int) -> int:
     """A 2^30 / d to 30 bits, d > 0: the quotient by a Q30 number, in the format of ``wide``."""
-    mantissa, exponent = reciprocal(divisor)
-    return shift(mul(wide, mantissa), exponent)
+    mantissa, exponent = reciprocal_parts(divisor)
+    return rounded_shift(multiply_q31(wide, mantissa), exponent)
 
 
 @kernel
@@ -83,7 +83,7 @@ def inverse_root(value: int) -> tuple[int, int]:
 
     y <- y (3 - x y^2) / 2, twice, from a table of 192 (8 bits, then 16, then 30).
     """
-    exponent = (bits(value) - 61) >> 1
+    exponent = (bit_length(value) - 61) >> 1
     x = value << (-2 * exponent)
     y = ROOTS[x >> 54]
     for _ in range(2):
@@ -98,7 +98,7 @@ def root_of(value: int) -> int:
     if value <= 0:
         return 0
     root, exponent = inverse_root(value)
-    return shift(mul(value << (-2 * exponent), root), 18 - exponent)
+    return rounded_shift(multiply_q31(value << (-2 * exponent), root), 18 - exponent)
 
 
 @kernel

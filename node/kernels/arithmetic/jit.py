@@ -16,18 +16,18 @@ import os
 import stat
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
 import numba
 import numpy as np
 from numba import config, njit
-from numba.core.caching import UserProvidedCacheLocator
+
+from node.kernels.arithmetic.compiler import NO_WRAPPER, UserProvidedCacheLocator, kept_where
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-# nobody calls kernels through C pointers: without that wrapper each compiles faster
-OPTIONS: Final[dict[str, Any]] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+OPTIONS: Final[dict[str, Any]] = {"cache": True, "error_model": "numpy", **NO_WRAPPER}
 
 
 @functools.cache
@@ -41,7 +41,7 @@ def folder_digest(folder: Path) -> str:
 
 def source_digest() -> str:
     """Digest of every kernel source of this package and of the compiler's version."""
-    sources = numba.__version__ + folder_digest(Path(__file__).parent)
+    sources = numba.__version__ + folder_digest(Path(__file__).parents[1])
     return hashlib.sha256(sources.encode()).hexdigest()[:16]
 
 
@@ -89,22 +89,6 @@ def folder_in_use() -> Path:
     return Path(vars(config)["CACHE_DIR"])
 
 
-def leave_blas_out() -> None:
-    """Have numba load without a BLAS: for a process of ours, whose kernels multiply by themselves.
-
-    Numba imports ``scipy.linalg`` as it compiles or loads its first function, a quarter of a second of every start, and
-    holds that none is there where the import fails. Not for an interpreter that runs somebody else's code too.
-    """
-    name = "scipy.linalg"
-    if name in sys.modules:
-        return
-    sys.modules[name] = cast("Any", None)  # so an import of it fails
-    try:
-        import numba.np.arraymath  # noqa: F401  numba looks for the BLAS once, as it imports this
-    finally:
-        del sys.modules[name]
-
-
 class SourceLocator(UserProvidedCacheLocator):
     """Place of a kept function in the cache: by its module; kept as long as no source changes that it may be made of.
 
@@ -125,38 +109,31 @@ class SourceLocator(UserProvidedCacheLocator):
         return self._stamp
 
 
-@contextlib.contextmanager
-def known_by_its_sources() -> Iterator[None]:
-    """Have numba keep what is declared inside where ``SourceLocator`` says, and other people's where it did."""
-    before = vars(config)["CACHE_LOCATOR_CLASSES"]
-    vars(config)["CACHE_LOCATOR_CLASSES"] = f"{__name__}.{SourceLocator.__name__}"
-    try:
-        yield
-    finally:
-        vars(config)["CACHE_LOCATOR_CLASSES"] = before
-
-
-def compiled(function: Function, **options: Any) -> Function:
+def compile_function(function: Function, **options: Any) -> Function:
     """Have ``function`` compiled with our options and these when it is first called."""
-    with known_by_its_sources():
+    with kept_where(SourceLocator):
         return cast("Function", njit(**OPTIONS | options)(function))
 
 
 def kernel(function: Function) -> Function:
     """Compile ``function`` on its first call or load it from the cache."""
-    return compiled(function)
+    return compile_function(function)
 
 
-def entry(function: Function) -> Function:
+def entry_kernel(function: Function) -> Function:
     """Compile ``function`` as a kernel that others may call by its address, and need not hold a copy of."""
-    return compiled(function, no_cfunc_wrapper=False)
+    return compile_function(function, no_cfunc_wrapper=False)
 
 
 def shared_body(function: Function) -> Function:
-    """Write ``function`` into every kernel that calls it: kernels that it is given are known there and cost nothing."""
-    return compiled(function, inline="always")
+    """Write ``function`` into every kernel that calls it, which may give it kernels.
+
+    It buys no speed of its own: one body stands for every filter that a step is made with. Numba cannot keep a function
+    that takes another (decision 23), so without it each step would have a body of its own.
+    """
+    return compile_function(function, inline="always")
 
 
-def constant(value: int) -> int:
+def kernel_constant(value: int) -> int:
     """An integer that kernels give to each other: for every other plain ``int`` numba compiles the callee anew."""
     return cast("int", np.int64(value))

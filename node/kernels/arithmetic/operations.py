@@ -2,6 +2,9 @@
 
 For floats each is the plain expression, to the last bit. For integers it is what stands beside it in integers, in the
 formats of ``node.kernels.arithmetic.quantity``; an argument beyond its range is held, so that nothing overflows.
+
+What it buys is that of ``node.kernels.arithmetic.quantity``: one source, and no speed. A call that numba takes by type
+is the code of the function taken.
 """
 
 from __future__ import annotations
@@ -13,14 +16,15 @@ from typing import Any, Final, TypeVar
 from numba import types
 from numba.extending import overload
 
+from node.kernels.arithmetic.compiler import NO_WRAPPER
 from node.kernels.arithmetic.formats import ANGLE_Q, CEILING, PERIOD, RATE_Q, TIME_Q, VECTOR_Q, Array
-from node.kernels.arithmetic.integers import mean_of, mul, quotient, root_of, shift
+from node.kernels.arithmetic.integers import mean_of, multiply_q31, quotient_q30, root_of, rounded_shift
 from node.kernels.arithmetic.jit import kernel
 from node.kernels.arithmetic.quantity import NO_NUMBER
-from node.kernels.arithmetic.trigonometry import TURN, counts, difference, radians
+from node.kernels.arithmetic.trigonometry import TURN, counts_difference, counts_to_radians, radians_to_counts
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-OPTIONS: Final[Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+OPTIONS: Final[Any] = {"error_model": "numpy", **NO_WRAPPER}
 LARGEST: Final = 1 << 61
 TWO: Final = 1 << 31
 UNITY: Final = 1 << VECTOR_Q
@@ -61,14 +65,14 @@ def by_record(integers: Callable[..., Any]) -> Callable[[Function], Function]:
     return taken_where(holds_integers, integers)
 
 
-@by_type(lambda a, f: mul(a, f) << 1)
-def times(a: float, f: float) -> float:
+@by_type(lambda a, f: multiply_q31(a, f) << 1)
+def times_factor(a: float, f: float) -> float:
     """A quantity times a factor."""
     return a * f
 
 
-@by_type(quotient)
-def over(a: float, f: float) -> float:
+@by_type(quotient_q30)
+def over_factor(a: float, f: float) -> float:
     """A quantity by a factor above 0."""
     return a / f
 
@@ -76,11 +80,11 @@ def over(a: float, f: float) -> float:
 def _ratio(a: int, b: int) -> int:
     if abs(a) >> 31 >= b:
         return LARGEST if a > 0 else -LARGEST
-    return quotient(a, b)
+    return quotient_q30(a, b)
 
 
 @by_type(_ratio)
-def ratio(a: float, b: float) -> float:
+def quantity_ratio(a: float, b: float) -> float:
     """A factor: one quantity by another one of its kind, above 0; integers are held at 2^31."""
     return a / b
 
@@ -88,32 +92,32 @@ def ratio(a: float, b: float) -> float:
 def _fraction(a: int, b: int) -> int:
     if abs(a) >> 1 >= b:
         return TWO if a > 0 else -TWO
-    return quotient(a, b)
+    return quotient_q30(a, b)
 
 
 _fraction_of = kernel(_fraction)
 
 
 @by_type(_fraction)
-def fraction(a: float, b: float) -> float:
-    """As ``ratio``, to multiply by: integers are held at 2."""
+def bounded_ratio(a: float, b: float) -> float:
+    """As ``quantity_ratio``, to multiply by: integers are held at 2."""
     return a / b
 
 
-@by_type(lambda a, part, whole: mul(a, _fraction_of(part, whole)) << 1)
-def share(a: float, part: float, whole: float) -> float:
+@by_type(lambda a, part, whole: multiply_q31(a, _fraction_of(part, whole)) << 1)
+def proportional_share(a: float, part: float, whole: float) -> float:
     """A quantity times a part of a whole, of one kind; integers hold the part at twice the whole."""
     return a * part / whole
 
 
 def _turn(w: int, dt: int) -> int:
     if -(1 << 31) <= dt <= 1 << 31:
-        return shift(mul(w, dt), RATE_Q + TIME_Q - 31 - ANGLE_Q)
-    return mul(w, max(min(dt, LONGEST), -LONGEST) >> 9) << (9 - (RATE_Q + TIME_Q - 31 - ANGLE_Q))
+        return rounded_shift(multiply_q31(w, dt), RATE_Q + TIME_Q - 31 - ANGLE_Q)
+    return multiply_q31(w, max(min(dt, LONGEST), -LONGEST) >> 9) << (9 - (RATE_Q + TIME_Q - 31 - ANGLE_Q))
 
 
 @by_type(_turn)
-def turn(w: float, dt: float) -> float:
+def turned_angle(w: float, dt: float) -> float:
     """The angle of a rate over a time; integers: of at most 4096 s."""
     return w * dt
 
@@ -122,51 +126,51 @@ def _speed(turned: int, dt: int) -> int:
     time = max(dt, SHORTEST)
     if abs(turned) >> (ANGLE_Q - TIME_Q + 10) >= time:
         return FASTEST if turned > 0 else -FASTEST
-    return quotient(turned, time) << (RATE_Q - ANGLE_Q + TIME_Q - 30)
+    return quotient_q30(turned, time) << (RATE_Q - ANGLE_Q + TIME_Q - 30)
 
 
 @by_type(_speed)
-def speed(turned: float, dt: float) -> float:
+def turning_rate(turned: float, dt: float) -> float:
     """The rate of an angle over a time above 0; integers: over at least 1 ms, held at 1024 rad/s."""
     return turned / dt
 
 
 def _square(a: int) -> int:
-    held = shift(min(abs(a), LARGEST_SQUARED), 12)
+    held = rounded_shift(min(abs(a), LARGEST_SQUARED), 12)
     return held * held
 
 
 @by_type(_square)
-def square(a: float) -> float:
+def angular_square(a: float) -> float:
     """The variance of an angle or of a rate; integers are held at 16 rad^2, or at (3.6 deg/s)^2."""
     return a * a
 
 
 @by_type(root_of)
-def root(a: float) -> float:
+def angular_root(a: float) -> float:
     """The angle or the rate of a variance."""
     return math.sqrt(a)
 
 
 def _product(a: int, b: int) -> int:
-    return shift(max(min(a, LARGEST_SQUARED), -LARGEST_SQUARED), 12) * shift(
+    return rounded_shift(max(min(a, LARGEST_SQUARED), -LARGEST_SQUARED), 12) * rounded_shift(
         max(min(b, LARGEST_SQUARED), -LARGEST_SQUARED), 12
     )
 
 
 @by_type(_product)
-def product(a: float, b: float) -> float:
-    """The covariance of two angles, as ``square``."""
+def angular_product(a: float, b: float) -> float:
+    """The covariance of two angles, as ``angular_square``."""
     return a * b
 
 
-@by_type(lambda a: shift(a, 9))
-def coarse(a: float) -> float:
+@by_type(lambda a: rounded_shift(a, 9))
+def coarse_rate(a: float) -> float:
     """A rate whose square fits: integers in Q37."""
     return a
 
 
-@by_type(lambda a: shift(root_of(a), 12))
+@by_type(lambda a: rounded_shift(root_of(a), 12))
 def time_root(a: float) -> float:
     """The time of a variance of a clock (s^2)."""
     return math.sqrt(a)
@@ -184,8 +188,8 @@ def stamp_before(stamp: float, later: float) -> float:
     return stamp - later
 
 
-@by_type(lambda drift, time: shift(shift(drift, 16) * min(time, LONGEST), RATE_Q - 16))
-def drifted(drift: float, time: float) -> float:
+@by_type(lambda drift, time: rounded_shift(rounded_shift(drift, 16) * min(time, LONGEST), RATE_Q - 16))
+def clock_drift_offset(drift: float, time: float) -> float:
     """By how much (s) a clock is off by its ``drift`` (s/s) after a ``time``, in integers of up to 4096 s."""
     return drift * time
 
@@ -197,37 +201,37 @@ def scale_square(f: float) -> float:
 
 
 @by_type(lambda a: min(a, CEILING))
-def held(a: float) -> float:
+def bounded_variance(a: float) -> float:
     """A variance as the filter may have it."""
     return a
 
 
-@by_type(lambda w, scale: w + mul(w, shift(scale, RATE_Q - 31)))
-def scaled(w: float, scale: float) -> float:
+@by_type(lambda w, scale: w + multiply_q31(w, rounded_shift(scale, RATE_Q - 31)))
+def indicated_rate(w: float, scale: float) -> float:
     """What a gyroscope of a ``scale`` error shows of a rate."""
     return w * (1.0 + scale)
 
 
-@by_type(lambda w, scale: quotient(w, max(UNITY + shift(scale, RATE_Q - VECTOR_Q), 1)))
-def unscaled(w: float, scale: float) -> float:
+@by_type(lambda w, scale: quotient_q30(w, max(UNITY + rounded_shift(scale, RATE_Q - VECTOR_Q), 1)))
+def true_rate(w: float, scale: float) -> float:
     """The rate of which a gyroscope of a ``scale`` error shows ``w``."""
     return w / (1.0 + scale)
 
 
 def _length(x: int, y: int, z: int) -> int:
     a, b, c = x >> 3, y >> 3, z >> 3
-    return shift(root_of(a * a + b * b + c * c), 9)
+    return rounded_shift(root_of(a * a + b * b + c * c), 9)
 
 
 @by_type(_length)
-def length(x: float, y: float, z: float) -> float:
+def vector_length(x: float, y: float, z: float) -> float:
     """Length of a vector; integers: each at most 32 g."""
     return math.sqrt(x * x + y * y + z * z)
 
 
 def _factor_of(a: int, q: int) -> int:
     limit = 1 << (q + 1)
-    return shift(max(min(a, limit), -limit), q - VECTOR_Q)
+    return rounded_shift(max(min(a, limit), -limit), q - VECTOR_Q)
 
 
 @by_type(_factor_of)
@@ -237,42 +241,42 @@ def factor_of(a: float, q: int) -> float:
 
 
 @by_type(mean_of)
-def mean(total: float, count: int) -> float:
+def mean_of_total(total: float, count: int) -> float:
     """A sum by its count."""
     return total / count
 
 
 @by_type(lambda a: a >> 1)
-def half(a: float) -> float:
+def half_of(a: float) -> float:
     """Half of it."""
     return 0.5 * a
 
 
 @by_type(lambda a: max(min(a, 1 << 28), -(1 << 28)))
-def within(a: float) -> float:
+def bounded_deviation(a: float) -> float:
     """A deviation of a force; integers are held at 4 g, so that 64 squares fit."""
     return a
 
 
 @by_type(lambda a: a)
-def number(a: float) -> float:
+def as_number(a: float) -> float:
     """The number itself: for a checker of types, which does not know what a record holds."""
     return a
 
 
 @by_type(lambda like, cycles: cycles * PERIOD_FIXED)
-def lasting(like: float, cycles: int) -> float:
+def time_of_cycles(like: float, cycles: int) -> float:
     """The time of so many cycles, in the form of ``like``."""
     return cycles * PERIOD
 
 
-@by_type(lambda angle: counts(angle, ANGLE_Q) & TURN)
+@by_type(lambda angle: radians_to_counts(angle, ANGLE_Q) & TURN)
 def kept_angle(angle: float) -> float:
     """An angle as the filter keeps a measured yaw and the offset of joints: integers as a binary angle."""
     return angle
 
 
-@by_type(lambda a: radians(difference(int(a), 0)))
+@by_type(lambda a: counts_to_radians(counts_difference(int(a), 0)))
 def offset_angle(a: float) -> float:
     """An offset of joints as an angle; the integers hold it as a binary angle."""
     return a
@@ -293,7 +297,7 @@ def are_numbers(rate: Array, force: Array) -> bool:
     return found == 3
 
 
-@by_type(lambda like, binary: radians(int(binary)))
+@by_type(lambda like, binary: counts_to_radians(int(binary)))
 def angle_of(like: float, binary: int) -> float:
     """Angle (rad) in [0, 2 pi) of a binary angle, in the form of ``like``."""
     return float(binary) * (2.0 * math.pi / 4294967296.0)

@@ -19,6 +19,9 @@ temperature C                              23      256 C
 
 Sums, comparisons and products with small whole numbers are those of the language for both; for products, quotients
 and roots of quantities see ``node.kernels.arithmetic.operations``.
+
+What it buys: one source for both arithmetics, and no speed. The modules around the filter (sensors, string, turns,
+step) would stand there twice, and a rule be changed in one of them.
 """
 
 from __future__ import annotations
@@ -27,18 +30,15 @@ import math
 from typing import Any, Final
 
 from numba import types
-from numba.core.imputils import lower_constant
-from numba.core.typeconv.castgraph import Conversion
-from numba.core.typing.typeof import Purpose
-from numba.extending import lower_cast, models, overload, register_model, typeof_impl
+from numba.extending import typeof_impl
 
+from node.kernels.arithmetic.compiler import ConstantType, is_argument
 from node.kernels.arithmetic.formats import ANGLE_Q, FORCE_Q, NEVER, RATE_Q, TIME_Q, VAR_Q, VECTOR_Q
 
 NO_NUMBER: Final = 1 << 60  # in integers, where a float is NaN
 RATE_VAR_Q: Final = VAR_Q + 12  # (rad/s)^2
 WARMTH_Q: Final = VECTOR_Q - 7  # C
 STANDARD_GRAVITY: Final = 9.80665
-FORMS: Final = (types.float64, types.int64)
 
 
 class Constant(float):
@@ -53,111 +53,60 @@ class Constant(float):
         return made
 
 
-class ConstantType(types.Opaque):
-    """Type of one constant, as numba knows it: it becomes the float or the integer of what it meets.
-
-    It has to meet something: alone, as under a minus, numba takes it for the integer.
-    """
-
-    def __init__(self, value: float, fixed: int) -> None:
-        self.value, self.fixed = value, fixed
-        super().__init__(f"Constant({value!r}, {fixed})")
-
-    def can_convert_to(self, _: Any, other: Any) -> Any:
-        """To the two forms and to nothing else."""
-        return Conversion.safe if other in FORMS else None
-
-    def unify(self, _: Any, other: Any) -> Any:
-        """The form of the other branch."""
-        return other if other in FORMS else None
-
-
-register_model(ConstantType)(models.OpaqueModel)
-
-
 @typeof_impl.register(Constant)
 def _type_of(value: Constant, context: Any) -> Any:
     """In a kernel it is a constant; Python hands it to one as the float that it is."""
-    if context.purpose is Purpose.argument:
+    if is_argument(context):
         return types.float64
     return ConstantType(float(value), value.fixed)
 
 
-@lower_constant(ConstantType)  # type: ignore[no-untyped-call]
-def _lower(context: Any, _builder: Any, _type: Any, _value: Any) -> Any:
-    return context.get_dummy_value()
-
-
-@lower_cast(ConstantType, types.float64)  # type: ignore[no-untyped-call]
-def _to_float(context: Any, _builder: Any, kind: ConstantType, _to: Any, _value: Any) -> Any:
-    return context.get_constant(types.float64, kind.value)
-
-
-@lower_cast(ConstantType, types.int64)  # type: ignore[no-untyped-call]
-def _to_integer(context: Any, _builder: Any, kind: ConstantType, _to: Any, _value: Any) -> Any:
-    return context.get_constant(types.int64, kind.fixed)
-
-
-def quantity(value: float, q: int) -> Constant:
+def quantity_in_q(value: float, q: int) -> Constant:
     """A constant in Q``q``."""
     return Constant(value, round(value * 2.0**q))
 
 
-def seconds(value: float) -> Constant:
+def time_quantity(value: float) -> Constant:
     """A time."""
-    return quantity(value, TIME_Q)
+    return quantity_in_q(value, TIME_Q)
 
 
-def rate(value: float) -> Constant:
+def rate_quantity(value: float) -> Constant:
     """An angular rate, rad/s."""
-    return quantity(value, RATE_Q)
+    return quantity_in_q(value, RATE_Q)
 
 
-def angle(value: float) -> Constant:
+def angle_quantity(value: float) -> Constant:
     """An angle, rad."""
-    return quantity(value, ANGLE_Q)
+    return quantity_in_q(value, ANGLE_Q)
 
 
-def force(value: float) -> Constant:
+def force_quantity(value: float) -> Constant:
     """A specific force, m/s^2; in integers by standard gravity."""
     return Constant(value, round(value / STANDARD_GRAVITY * 2.0**FORCE_Q))
 
 
-def variance(value: float) -> Constant:
+def variance_quantity(value: float) -> Constant:
     """A variance, rad^2, or s^2 of a clock."""
-    return quantity(value, VAR_Q)
+    return quantity_in_q(value, VAR_Q)
 
 
-def rate_variance(value: float) -> Constant:
+def rate_variance_quantity(value: float) -> Constant:
     """A variance of a rate, (rad/s)^2."""
-    return quantity(value, RATE_VAR_Q)
+    return quantity_in_q(value, RATE_VAR_Q)
 
 
-def warmth(value: float) -> Constant:
+def temperature_quantity(value: float) -> Constant:
     """A temperature, C; in integers it counts 128 C, so that it is a factor."""
-    return quantity(value, WARMTH_Q)
+    return quantity_in_q(value, WARMTH_Q)
 
 
-def factor(value: float) -> Constant:
+def factor_quantity(value: float) -> Constant:
     """A number without a unit, -2..2 where it multiplies."""
-    return quantity(value, VECTOR_Q)
+    return quantity_in_q(value, VECTOR_Q)
 
 
 NONE: Final = Constant(math.nan, NO_NUMBER)  # no number
 LONG_AGO: Final = Constant(-math.inf, NEVER)  # a time before all others
 NOT_YET: Final = Constant(math.nan, NEVER)  # a time that has not been
-ONE: Final = factor(1.0)
-
-
-@overload(min, strict=False)
-def _least(a: Any, b: Any) -> Any:
-    if isinstance(a, ConstantType) or isinstance(b, ConstantType):
-        return lambda a, b: b if b < a else a
-    return None
-
-
-@overload(max, strict=False)
-def _most(a: Any, b: Any) -> Any:
-    if isinstance(a, ConstantType) or isinstance(b, ConstantType):
-        return lambda a, b: b if b > a else a
-    return None
+ONE: Final = factor_quantity(1.0)

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from node.kernels.arithmetic.integers import LOW31, bits, mul, shift, shift_down
+from node.kernels.arithmetic.integers import LOW31, bit_length, multiply_q31, rounded_shift, shift_down
 from node.kernels.arithmetic.jit import kernel
 
 STEPS: Final = 1024  # of the table of sines, a turn
@@ -26,20 +26,20 @@ SHORTER: Final = round(2.0**31 * math.prod(1.0 / math.sqrt(1.0 + 4.0**-k) for k 
 
 
 @kernel
-def counts(angle: int, q: int) -> int:
+def radians_to_counts(angle: int, q: int) -> int:
     """Binary increment, 2^32 a turn, of an ``angle`` (rad, Q``q``, q >= 33)."""
     right = q - 30
-    return (mul(angle, COUNTS_PER_RAD) + (1 << (right - 1))) >> right
+    return (multiply_q31(angle, COUNTS_PER_RAD) + (1 << (right - 1))) >> right
 
 
 @kernel
-def difference(a: int, b: int) -> int:
+def counts_difference(a: int, b: int) -> int:
     """A - b of two binary angles, in -2^31..2^31 - 1."""
     return ((int(a) - int(b) + 0x80000000) & TURN) - 0x80000000
 
 
 @kernel
-def radians(binary: int) -> int:
+def counts_to_radians(binary: int) -> int:
     """Angle (rad, Q40) of a binary difference (counts, signed)."""
     return (binary * RAD_PER_COUNT + (1 << 19)) >> 20
 
@@ -48,7 +48,7 @@ def radians(binary: int) -> int:
 def sine_cosine(binary: int) -> tuple[int, int]:
     """Sine and cosine (Q30) of a binary angle: sin(a + d) = sin a (1 - d^2/2) + cos a (d - d^3/6), |d| <= pi/1024."""
     nearest = (binary + (1 << 21)) >> 22
-    d = radians(binary - (nearest << 22)) >> 4  # Q36
+    d = counts_to_radians(binary - (nearest << 22)) >> 4  # Q36
     dd = (d * d) >> 36
     cd = (1 << 30) - ((dd + 64) >> 7)  # Q30
     sd = d - ((((d * dd) >> 36) * SIXTH) >> 31)  # Q36
@@ -60,9 +60,9 @@ def sine_cosine(binary: int) -> tuple[int, int]:
 
 
 @kernel
-def exponential(rate: int, dt: int) -> int:
+def exponential_decay(rate: int, dt: int) -> int:
     """2^(-rate dt), Q31: ``rate`` 1/s in Q42 and at least 0, ``dt`` s in Q28, 0..8 s."""
-    y = mul(rate, dt)  # Q39
+    y = multiply_q31(rate, dt)  # Q39
     whole = y >> 39
     if whole > 31:
         return 0
@@ -74,14 +74,14 @@ def exponential(rate: int, dt: int) -> int:
 
 
 @kernel
-def polar(x: int, y: int) -> tuple[int, int]:
+def polar_coordinates(x: int, y: int) -> tuple[int, int]:
     """Angle (rad, Q40) of the point (x, y) from x in -pi..pi, and its distance, in the format of both (below 2^61).
 
     CORDIC: turns of arctan 2^-k towards the axis, shifts and sums alone. Source: Volder, IRE Trans. EC-8 (1959) 330.
     """
     if x == 0 and y == 0:
         return 0, 0
-    room = 58 - bits(max(abs(x), abs(y)))
+    room = 58 - bit_length(max(abs(x), abs(y)))
     a, b, angle = shift_down(x, -room), shift_down(y, -room), 0
     if a < 0:
         angle = -HALF_TURN if b < 0 else HALF_TURN
@@ -91,4 +91,4 @@ def polar(x: int, y: int) -> tuple[int, int]:
             a, b, angle = a + (b >> k), b - (a >> k), angle + ARCS[k]
         else:
             a, b, angle = a - (b >> k), b + (a >> k), angle - ARCS[k]
-    return (angle + (1 << 19)) >> 20, shift(mul(a, SHORTER), room)
+    return (angle + (1 << 19)) >> 20, rounded_shift(multiply_q31(a, SHORTER), room)

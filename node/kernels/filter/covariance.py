@@ -12,7 +12,7 @@ COARSE: Final = 4  # times its own variance, from where an aiding is worth less 
 
 
 @kernel
-def isolate(P: Array, state: int, variance: float) -> None:
+def isolate_state(P: Array, state: int, variance: float) -> None:
     """Give one state the variance ``variance`` and no correlation with the others (a reset keeps no stale terms).
 
     It computes nothing, so it serves the integers too.
@@ -26,5 +26,5 @@ def isolate(P: Array, state: int, variance: float) -> None:
 @kernel
 def set_apart(state: Any, error: int, variance: float) -> None:
     """Give one error of the filter the variance ``variance``, and no correlation with others or the last survey."""
-    isolate(state.P, error, variance)
+    isolate_state(state.P, error, variance)
     state.surveyed_with[error] = 0

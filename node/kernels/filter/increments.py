@@ -11,21 +11,29 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.operations import fraction, half, is_number, number, share, times, turn
-from node.kernels.arithmetic.quantity import NONE, ONE, factor, seconds
+from node.kernels.arithmetic.operations import (
+    as_number,
+    bounded_ratio,
+    half_of,
+    is_number,
+    proportional_share,
+    times_factor,
+    turned_angle,
+)
+from node.kernels.arithmetic.quantity import NONE, ONE, factor_quantity, time_quantity
 from node.kernels.record.filter_record import PARTS, RECENT, RING
 from node.kernels.record.ring import is_split
 
-INSTANT: Final = seconds(1e-6)  # s, up to which a time is no time
-GAP: Final = seconds(1e-3)  # s, between two cycles that adjoin
-BENT: Final = factor(0.25)  # of a bend, see ``bent_angle``
+INSTANT: Final = time_quantity(1e-6)  # s, up to which a time is no time
+GAP: Final = time_quantity(1e-3)  # s, between two cycles that adjoin
+BENT: Final = factor_quantity(0.25)  # of a bend, see ``bent_angle``
 
 
 @kernel
 def part_length(state: Any, cycle: int) -> float:
     """Length of a part of ``cycle``, s."""
     slot = cycle % RING
-    return half(half(half(state.ring_end[slot] - state.ring_start[slot])))
+    return half_of(half_of(half_of(state.ring_end[slot] - state.ring_start[slot])))
 
 
 @kernel
@@ -39,7 +47,7 @@ def part_at(state: Any, cycle: int, at: float) -> int:
 
 
 @kernel
-def rise(state: Any, cycle: int, part: int) -> float:
+def rate_rise(state: Any, cycle: int, part: int) -> float:
     """How much faster (rad/s) a part turned than the one before; parts beyond those of ``cycle`` are its neighbours'.
 
     No number where one of the two is not known.
@@ -49,7 +57,7 @@ def rise(state: Any, cycle: int, part: int) -> float:
         part += PARTS if part < 0 else -PARTS
     if 0 < part < PARTS:
         own = state.ring_parts[cycle % RECENT]
-        return number(own[part] - own[part - 1]) if is_split(state, cycle) else NONE
+        return as_number(own[part] - own[part - 1]) if is_split(state, cycle) else NONE
     before = cycle - 1 if part == 0 else cycle
     after = before + 1
     if not (is_split(state, before) and is_split(state, after)):
@@ -57,29 +65,29 @@ def rise(state: Any, cycle: int, part: int) -> float:
     if state.ring_start[after % RING] - state.ring_end[before % RING] > GAP:
         return NONE
     last = state.ring_rate[before % RING, 2] + state.ring_parts[before % RECENT, PARTS - 1]
-    return number(state.ring_rate[after % RING, 2] + state.ring_parts[after % RECENT, 0] - last)
+    return as_number(state.ring_rate[after % RING, 2] + state.ring_parts[after % RECENT, 0] - last)
 
 
 @kernel
 def part_rate(state: Any, cycle: int, part: int, off: float, length: float) -> float:
     """How much faster than its cycle a part turns (rad/s) at ``off`` (s) from its middle; it is ``length`` (s) long."""
-    into, out = rise(state, cycle, part), rise(state, cycle, part + 1)
+    into, out = rate_rise(state, cycle, part), rate_rise(state, cycle, part + 1)
     if not is_number(into):
         slope = out
     elif not is_number(out):
         slope = into
     else:
-        slope = half(into + out)
-    return number(state.ring_parts[cycle % RECENT, part] + times(slope, fraction(off, length)))
+        slope = half_of(into + out)
+    return as_number(state.ring_parts[cycle % RECENT, part] + times_factor(slope, bounded_ratio(off, length)))
 
 
 @kernel
-def faster(state: Any, cycle: int, begin: float, end: float) -> float:
+def mean_excess_rate(state: Any, cycle: int, begin: float, end: float) -> float:
     """Mean from ``begin`` to ``end`` (s) inside a split ``cycle`` of how much faster than its mean it turns (rad/s)."""
     start, length = state.ring_start[cycle % RING], part_length(state, cycle)
     if end - begin <= INSTANT:
         part = part_at(state, cycle, begin)
-        return part_rate(state, cycle, part, begin - start - part * length - half(length), length)
+        return part_rate(state, cycle, part, begin - start - part * length - half_of(length), length)
     total: float = 0
     if begin == start and end == state.ring_end[cycle % RING]:
         return total
@@ -88,18 +96,18 @@ def faster(state: Any, cycle: int, begin: float, end: float) -> float:
         since = max(begin, border)
         until = end if part == PARTS - 1 else min(end, border + length)
         if until > since:
-            middle = half(since - border) + half(until - border) - half(length)
-            total += share(part_rate(state, cycle, part, middle, length), until - since, end - begin)
+            middle = half_of(since - border) + half_of(until - border) - half_of(length)
+            total += proportional_share(part_rate(state, cycle, part, middle, length), until - since, end - begin)
     return total
 
 
 @kernel
-def bend(state: Any, cycle: int, part: int) -> float:
+def rate_bend(state: Any, cycle: int, part: int) -> float:
     """How much the rates of three parts bend (rad/s): the rise to the one in the middle less the rise from it."""
-    into, out = rise(state, cycle, part), rise(state, cycle, part + 1)
+    into, out = rate_rise(state, cycle, part), rate_rise(state, cycle, part + 1)
     if not is_number(into):
-        return number(out) if is_number(out) else 0
-    return number(into - out) if is_number(out) else number(into)
+        return as_number(out) if is_number(out) else 0
+    return as_number(into - out) if is_number(out) else as_number(into)
 
 
 @kernel
@@ -110,10 +118,14 @@ def bend_at(state: Any, cycle: int, at: float) -> float:
     Their sum is the jump, which counts for two bends; where a ramp begins or ends all three are of one sign.
     """
     part = part_at(state, cycle, at)
-    own, before, after = bend(state, cycle, part), bend(state, cycle, part - 1), bend(state, cycle, part + 1)
+    own, before, after = (
+        rate_bend(state, cycle, part),
+        rate_bend(state, cycle, part - 1),
+        rate_bend(state, cycle, part + 1),
+    )
     if (before < 0) == (after < 0):
-        return number(own)
-    return number(max(abs(own), 2 * (abs(before) + abs(after))))
+        return as_number(own)
+    return as_number(max(abs(own), 2 * (abs(before) + abs(after))))
 
 
 @kernel
@@ -126,5 +138,7 @@ def bent_angle(state: Any, cycle: int, at: float) -> float:
     """
     length = part_length(state, cycle)
     off = at - state.ring_start[cycle % RING] - part_at(state, cycle, at) * length
-    inside = fraction(min(max(off, 0), length), length)
-    return turn(times(bend_at(state, cycle, at), times(times(inside, ONE - inside), BENT)), length)
+    inside = bounded_ratio(min(max(off, 0), length), length)
+    return turned_angle(
+        times_factor(bend_at(state, cycle, at), times_factor(times_factor(inside, ONE - inside), BENT)), length
+    )

@@ -5,25 +5,27 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.arithmetic.formats import Array
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import held, mean
-from node.kernels.arithmetic.quantity import rate, variance
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import bounded_variance, mean_of_total
+from node.kernels.arithmetic.quantity import rate_quantity, variance_quantity
 from node.kernels.filter.covariance import set_apart
 from node.kernels.filter.priors import bias_mean_var, bias_var
-from node.kernels.record.filter_record import UNKNOWN_YAW_VAR, Err, Status
+from node.kernels.record.filter_record import UNKNOWN_YAW_VAR, CycleStatus, Err
 
-BX = constant(Err.BIAS_X)
-UNKNOWN_VAR: Final = variance(UNKNOWN_YAW_VAR)  # rad^2
-PSI = constant(Err.YAW)
+BX = kernel_constant(Err.BIAS_X)
+UNKNOWN_VAR: Final = variance_quantity(UNKNOWN_YAW_VAR)  # rad^2
+PSI = kernel_constant(Err.YAW)
 STATIC_BIAS, TRACKING, STILL, SURVEY, HELD = 1, 3, 4, 5, 6  # telemetry.messages.Mode, which kernels do not see
-STOPPED, STARTED, SURVEY_READY = int(Status.STOPPED), int(Status.STARTED), int(Status.SURVEY_READY)
-JOINT_OPENED, JOINT_CLOSED = int(Status.JOINT_OPENED), int(Status.JOINT_CLOSED)
+STOPPED, STARTED, SURVEY_READY = int(CycleStatus.STOPPED), int(CycleStatus.STARTED), int(CycleStatus.SURVEY_READY)
+JOINT_OPENED, JOINT_CLOSED = int(CycleStatus.JOINT_OPENED), int(CycleStatus.JOINT_CLOSED)
 BIAS_KNOWN, RATE_EXCEEDED, RATE_RECOVERED = (
-    int(Status.BIAS_KNOWN),
-    int(Status.RATE_EXCEEDED),
-    int(Status.RATE_RECOVERED),
+    int(CycleStatus.BIAS_KNOWN),
+    int(CycleStatus.RATE_EXCEEDED),
+    int(CycleStatus.RATE_RECOVERED),
 )
-UNBIASED_STILL_RATE: Final = rate(0.0087)  # rad/s, 0.5 deg/s: still, for a gyroscope whose bias is not known yet
+UNBIASED_STILL_RATE: Final = rate_quantity(
+    0.0087
+)  # rad/s, 0.5 deg/s: still, for a gyroscope whose bias is not known yet
 
 
 @kernel
@@ -57,10 +59,10 @@ def learn_static_bias(state: Any, config: Any, rate: Array, dt: float, quiet: in
         return 0
     total = state.bias_count * dt
     for k in range(3):
-        state.static_bias[k] = mean(state.bias_sum[k], state.bias_count)
+        state.static_bias[k] = mean_of_total(state.bias_sum[k], state.bias_count)
         state.static_bias_var[k] = bias_mean_var(config, k, total)
         state.bias[k] = 0
-        set_apart(state, BX + k, held(bias_var(config, k) + state.static_bias_var[k]))
+        set_apart(state, BX + k, bounded_variance(bias_var(config, k) + state.static_bias_var[k]))
     state.mode = TRACKING
     return BIAS_KNOWN
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.operations import mean, within
+from node.kernels.arithmetic.operations import bounded_deviation, mean_of_total
 from node.kernels.record.filter_record import RING
 
 
@@ -20,12 +20,14 @@ def average_force(state: Any, samples: int) -> None:
         middle[i] = 0
         for k in range(samples):
             middle[i] += state.ring_force[(state.cycles - 1 - k) % RING, i]
-        middle[i] = mean(middle[i], samples)
+        middle[i] = mean_of_total(middle[i], samples)
     for i in range(3):
         for j in range(i, 3):
             total: float = 0
             for k in range(samples):
                 slot = (state.cycles - 1 - k) % RING
-                total += within(state.ring_force[slot, i] - middle[i]) * within(state.ring_force[slot, j] - middle[j])
-            cov[i, j] = mean(total, samples * (samples - 1))
+                total += bounded_deviation(state.ring_force[slot, i] - middle[i]) * bounded_deviation(
+                    state.ring_force[slot, j] - middle[j]
+                )
+            cov[i, j] = mean_of_total(total, samples * (samples - 1))
             cov[j, i] = cov[i, j]

@@ -9,16 +9,16 @@ import math
 from typing import Any
 
 from node.kernels.arithmetic.formats import CEILING, FACTOR_Q, TAU_Q, TIME_Q, UNIT
-from node.kernels.arithmetic.integers import mul, quotient, shift
+from node.kernels.arithmetic.integers import multiply_q31, quotient_q30, rounded_shift
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.operations import SHORTEST, by_record, root, square, stamp_square
+from node.kernels.arithmetic.operations import SHORTEST, angular_root, angular_square, by_record, stamp_square
 
 
 @kernel
 def over_time(area: int, time: int) -> int:
     """A variance times seconds (Q56) by a time (s, Q28, at least 1 ms), held at the ceiling of variances."""
     over = max(time, SHORTEST)
-    return CEILING if area >> 32 >= over else shift(quotient(area, over), 30 - TIME_Q)
+    return CEILING if area >> 32 >= over else rounded_shift(quotient_q30(area, over), 30 - TIME_Q)
 
 
 @by_record(lambda config, k: config.bias_var[k])
@@ -58,16 +58,16 @@ def bias_mean_var(config: Any, k: int, time: float) -> float:
     return float(config.gyro_noise[k] ** 2 / time + correlated)
 
 
-@by_record(lambda config, off, var: mul(int(square(off)), config.gate_inverse) > var)
+@by_record(lambda config, off, var: multiply_q31(int(angular_square(off)), config.gate_inverse) > var)
 def is_beyond_gate(config: Any, off: float, var: float) -> bool:
     """Whether an angle is beyond the gate of a variance (rad^2)."""
-    return bool(abs(off) > config.gate * root(var))
+    return bool(abs(off) > config.gate * angular_root(var))
 
 
 @kernel
 def square_force(std: int) -> int:
     """The variance (g^2, Q56) of a force that is off by ``std`` (g, Q46)."""
-    return int(square(std)) >> 12
+    return int(angular_square(std)) >> 12
 
 
 @kernel
@@ -76,7 +76,7 @@ def set_gyro_noise(config: Any, k: int, var: int) -> None:
     config.rate_noise[k] = var
     config.changes += 1
     config.noise_var[k] = var >> (2 * UNIT)
-    config.rate_walk[k] = mul(var, config.attitude_var) << (31 - FACTOR_Q)
+    config.rate_walk[k] = multiply_q31(var, config.attitude_var) << (31 - FACTOR_Q)
     config.walk[k] = config.rate_walk[k] >> (2 * UNIT)
 
 
@@ -85,12 +85,12 @@ def set_bias_var(config: Any, k: int, var: int) -> None:
     """Set the variance of the part of bias ``k`` that wanders, and what of the integers is made of it."""
     config.changes += 1
     config.bias_var[k] = min(var, CEILING)
-    config.bias_drive[k] = mul(config.bias_var[k], config.bias_factor_var) << (31 - FACTOR_Q)
-    config.bias_area[k] = config.rate_noise[k] + (mul(config.bias_var[k], config.twice_tau[k]) << (31 - TAU_Q))
+    config.bias_drive[k] = multiply_q31(config.bias_var[k], config.bias_factor_var) << (31 - FACTOR_Q)
+    config.bias_area[k] = config.rate_noise[k] + (multiply_q31(config.bias_var[k], config.twice_tau[k]) << (31 - TAU_Q))
 
 
 def _widen(config: Any, k: int, moved: int) -> None:
-    set_bias_var(config, k, max(config.bias_var[k], square(moved)))
+    set_bias_var(config, k, max(config.bias_var[k], angular_square(moved)))
 
 
 @by_record(_widen)
@@ -100,7 +100,7 @@ def widen_bias(config: Any, k: int, moved: float) -> None:
 
 
 def _calm(config: Any, k: int, plain: int) -> None:
-    set_bias_var(config, k, max(square(plain), config.bias_var[k] >> 2))
+    set_bias_var(config, k, max(angular_square(plain), config.bias_var[k] >> 2))
 
 
 @by_record(_calm)
@@ -112,15 +112,15 @@ def calm_bias(config: Any, k: int, plain: float) -> None:
 @kernel
 def over_weight(var: int, weight: int) -> int:
     """A variance by the weight (Q24) of the IMUs in use."""
-    return quotient(var >> 6, weight)
+    return quotient_q30(var >> 6, weight)
 
 
 def _set_noise(config: Any, settings: Any, weight: int) -> None:
     config.force_var = over_weight(square_force(settings.plain_force_std), weight)
     for k in range(3):
-        plain = int(square(settings.plain_gyro_noise[k]))
+        plain = int(angular_square(settings.plain_gyro_noise[k]))
         set_gyro_noise(config, k, over_weight(plain, weight))
-        set_bias_var(config, k, over_weight(int(square(settings.plain_bias_std[k])), weight))
+        set_bias_var(config, k, over_weight(int(angular_square(settings.plain_bias_std[k])), weight))
 
 
 @by_record(_set_noise)
@@ -137,7 +137,7 @@ def _set_stamp(config: Any, std: int, walk: int, hops: int) -> None:
     config.changes += 1
     config.stamp_std = std
     config.stamp_var = stamp_square(std)
-    config.stamp_walk_var = square(walk) * hops
+    config.stamp_walk_var = angular_square(walk) * hops
 
 
 @by_record(_set_stamp)

@@ -9,19 +9,24 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import held, stamp_before
-from node.kernels.arithmetic.quantity import LONG_AGO, NOT_YET, ONE, variance
-from node.kernels.filter.covariance import isolate, set_apart
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import bounded_variance, stamp_before
+from node.kernels.arithmetic.quantity import LONG_AGO, NOT_YET, ONE, variance_quantity
+from node.kernels.filter.covariance import isolate_state, set_apart
 from node.kernels.filter.modes import STATIC_BIAS
 from node.kernels.filter.priors import bias_var, boot_bias_var, scale_var, stamp_var
 from node.kernels.record.filter_record import STATES, UNKNOWN_YAW_VAR, Err
 
-TX, TY, PSI = constant(Err.TILT_X), constant(Err.TILT_Y), constant(Err.YAW)
-BX, BZ, S, D = constant(Err.BIAS_X), constant(Err.BIAS_Z), constant(Err.SCALE), constant(Err.STAMP)
-UNKNOWN_TILT_VAR: Final = variance(1.0)  # rad^2
-UNKNOWN_VAR: Final = variance(UNKNOWN_YAW_VAR)  # rad^2
-UNIFORM_VAR: Final = variance((math.pi / math.sqrt(3.0)) ** 2)  # rad^2, of the whole turn
+TX, TY, PSI = kernel_constant(Err.TILT_X), kernel_constant(Err.TILT_Y), kernel_constant(Err.YAW)
+BX, BZ, S, D = (
+    kernel_constant(Err.BIAS_X),
+    kernel_constant(Err.BIAS_Z),
+    kernel_constant(Err.SCALE),
+    kernel_constant(Err.STAMP),
+)
+UNKNOWN_TILT_VAR: Final = variance_quantity(1.0)  # rad^2
+UNKNOWN_VAR: Final = variance_quantity(UNKNOWN_YAW_VAR)  # rad^2
+UNIFORM_VAR: Final = variance_quantity((math.pi / math.sqrt(3.0)) ** 2)  # rad^2, of the whole turn
 
 
 @kernel
@@ -35,7 +40,7 @@ def copy_covariance(state: Any) -> None:
 @kernel
 def open_yaw(state: Any, var: float) -> None:
     """The yaw may have moved by a further ``var`` (rad^2), of which the rest knows nothing; cross terms stay true."""
-    state.P[PSI, PSI] = held(state.P[PSI, PSI] + var)
+    state.P[PSI, PSI] = bounded_variance(state.P[PSI, PSI] + var)
 
 
 @kernel
@@ -49,7 +54,7 @@ def doubt_yaw(state: Any, var: float) -> None:
 def lose_yaw(state: Any) -> None:
     """Nothing is known of the yaw, now and at the filter's epoch."""
     set_apart(state, PSI, UNKNOWN_VAR)
-    isolate(state.now_P, PSI, UNKNOWN_VAR)
+    isolate_state(state.now_P, PSI, UNKNOWN_VAR)
 
 
 @kernel
@@ -70,7 +75,7 @@ def settle_yaw(state: Any, aiding_var: float) -> None:
 def open_biases(state: Any, config: Any) -> None:
     """A gyroscope that may be another one: each bias has at least its prior, the scale no cross terms."""
     for k in range(3):
-        prior = held(bias_var(config, k) + state.static_bias_var[k])
+        prior = bounded_variance(bias_var(config, k) + state.static_bias_var[k])
         set_apart(state, BX + k, max(prior, state.P[BX + k, BX + k]))
     set_apart(state, S, state.P[S, S])
 
@@ -79,9 +84,9 @@ def open_biases(state: Any, config: Any) -> None:
 def take_mismatch(state: Any, of_bias: float, of_scale: float) -> None:
     """The gyroscope's bias or scale took a step: their variances are opened, and the yaw starts again."""
     set_apart(state, PSI, UNKNOWN_VAR)
-    set_apart(state, BZ, held(of_bias))
+    set_apart(state, BZ, bounded_variance(of_bias))
     set_apart(state, S, of_scale)
-    isolate(state.now_P, PSI, UNKNOWN_VAR)
+    isolate_state(state.now_P, PSI, UNKNOWN_VAR)
 
 
 @kernel
@@ -123,13 +128,13 @@ def forget_dates(state: Any) -> None:
 @kernel
 def doubt_stamp(state: Any, var: float) -> None:
     """The clock has moved by so much (s^2) since the time stamp's error was learnt."""
-    state.P[D, D] = held(state.P[D, D] + var)
+    state.P[D, D] = bounded_variance(state.P[D, D] + var)
 
 
 @kernel
 def doubt_bias(state: Any, k: int, var: float) -> None:
     """The mean of the cluster's gyroscopes is another one: bias ``k`` is in doubt by a further ``var`` ((rad/s)^2)."""
-    state.P[BX + k, BX + k] = held(state.P[BX + k, BX + k] + var)
+    state.P[BX + k, BX + k] = bounded_variance(state.P[BX + k, BX + k] + var)
 
 
 @kernel
@@ -138,7 +143,7 @@ def move_bias(state: Any, k: int, rate: float, var: float, wander_var: float) ->
     state.static_bias[k] = rate
     state.static_bias_var[k] = var
     state.bias[k] = 0
-    set_apart(state, BX + k, held(var + wander_var))
+    set_apart(state, BX + k, bounded_variance(var + wander_var))
 
 
 @kernel
@@ -157,7 +162,7 @@ def forget_bias(state: Any, config: Any) -> None:
 
 
 @kernel
-def resume(state: Any) -> None:
+def resume_filter(state: Any) -> None:
     """Make a saved filter ready for its first cycle after an outage of unknown length.
 
     The constants (bias, scale, offset) are kept. The attitude is kept as the best guess; if the string was turning when
@@ -185,7 +190,7 @@ def resume(state: Any) -> None:
 @kernel
 def begin_epoch(state: Any) -> None:
     """After a jump of the clock: earlier times and increments are void, and how far the string turned is unknown."""
-    resume(state)
+    resume_filter(state)
     state.yaw_known = 0
     state.last_sequence = -1
     state.last_aided = LONG_AGO
@@ -196,7 +201,7 @@ def begin_epoch(state: Any) -> None:
 
 @kernel
 def start_over(state: Any, config: Any) -> None:
-    """Invalid covariance: the filter knows nothing but its constant bias and its mode. Source: ``layout.new_state``."""
+    """Invalid covariance: nothing is known but the constant bias and the mode; as ``filter_record.new_state``."""
     for i in range(STATES):
         for j in range(STATES):
             state.P[i, j] = 0

@@ -10,19 +10,19 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import half, times
-from node.kernels.arithmetic.quantity import factor
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import half_of, times_factor
+from node.kernels.arithmetic.quantity import factor_quantity
 from node.kernels.filter.smoothing import begin_smoothing
-from node.kernels.record.filter_record import Err, Scheme, Status
+from node.kernels.record.filter_record import CycleStatus, Err, Scheme
 
-PSI = constant(Err.YAW)
+PSI = kernel_constant(Err.YAW)
 FORWARD = int(Scheme.FORWARD)
-REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
-CONTRADICTED = int(Status.YAW_RESET | Status.FILTER_FAULT)
+REFERENCE_CHANGED = int(CycleStatus.REFERENCE_CHANGED)
+CONTRADICTED = int(CycleStatus.YAW_RESET | CycleStatus.FILTER_FAULT)
 LONGEST: Final = 240  # cycles of turning
 SETTLED: Final = 20  # cycles of the next rest, in which its ramp has been judged
-WORTH_LAST: Final = factor(0.8)  # of the variance said before, that is worth a last message
+WORTH_LAST: Final = factor_quantity(0.8)  # of the variance said before, that is worth a last message
 
 
 @kernel
@@ -33,7 +33,7 @@ def open_revision(node: Any, settings: Any) -> None:
     revision.said_var = state.now_P[PSI, PSI]
     revision.systematic = state.systematic_var
     state.smoothing = 0
-    if settings.scheme == FORWARD and settings.as_published == 0 and not is_doubted(node):
+    if settings.scheme == FORWARD and not is_doubted(node):
         begin_smoothing(state)
 
 
@@ -80,6 +80,6 @@ def is_over(node: Any, status: int) -> bool:
 @kernel
 def is_worth(state: Any, revision: Any, is_last: bool) -> bool:
     """Whether the yaw of the survey is known so much better; a twist that came since is in all that tells of it."""
-    limit = times(revision.said_var, WORTH_LAST) if is_last else half(revision.said_var)
+    limit = times_factor(revision.said_var, WORTH_LAST) if is_last else half_of(revision.said_var)
     var = state.surveyed_var
     return bool(var < limit and var + state.systematic_var < revision.said_var + revision.systematic)

@@ -13,11 +13,16 @@ import math
 from typing import Any
 
 from node.kernels.arithmetic.angles import advance_binary
-from node.kernels.arithmetic.jit import constant, kernel
+from node.kernels.arithmetic.jit import kernel, kernel_constant
 from node.kernels.record.filter_record import STATES, Err
 
-TX, TY, PSI = constant(Err.TILT_X), constant(Err.TILT_Y), constant(Err.YAW)
-BX, BY, BZ, S = constant(Err.BIAS_X), constant(Err.BIAS_Y), constant(Err.BIAS_Z), constant(Err.SCALE)
+TX, TY, PSI = kernel_constant(Err.TILT_X), kernel_constant(Err.TILT_Y), kernel_constant(Err.YAW)
+BX, BY, BZ, S = (
+    kernel_constant(Err.BIAS_X),
+    kernel_constant(Err.BIAS_Y),
+    kernel_constant(Err.BIAS_Z),
+    kernel_constant(Err.SCALE),
+)
 
 
 @kernel
@@ -31,8 +36,8 @@ def begin_smoothing(state: Any) -> None:
 
 
 @kernel
-def carry(state: Any, wz: float, dt: float, turning: float, config: Any) -> None:
-    """Covariance with the states over ``dt`` (s) at the spin ``wz`` (rad/s), as ``error_model.propagate``: c F^T."""
+def propagate_survey_covariance(state: Any, wz: float, dt: float, turning: float, config: Any) -> None:
+    """Covariance with the states over ``dt`` (s) at the spin ``wz`` (rad/s), as ``propagation.propagate``: c F^T."""
     along = state.surveyed_with
     c, s = math.cos(wz * dt * turning), math.sin(wz * dt * turning)
     step = dt * turning

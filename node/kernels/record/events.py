@@ -6,7 +6,7 @@ import enum
 from typing import Any, Final
 
 from node.kernels.arithmetic.formats import DEG
-from node.kernels.arithmetic.integers import mul, shift
+from node.kernels.arithmetic.integers import multiply_q31, rounded_shift
 from node.kernels.arithmetic.jit import kernel
 from node.kernels.arithmetic.operations import by_type
 from node.kernels.record.node_record import EVENTS_KEPT
@@ -71,28 +71,28 @@ class Code(enum.IntEnum):
 
 
 @by_type(lambda like, count: count << TOLD_Q)
-def told_count(like: float, count: int) -> float:
+def event_count(like: float, count: int) -> float:
     """A count as a number of an event, in the form of ``like``."""
     return float(count)
 
 
-@by_type(lambda a, q: shift(a, q - TOLD_Q))
-def told(a: float, q: int) -> float:
+@by_type(lambda a, q: rounded_shift(a, q - TOLD_Q))
+def event_number(a: float, q: int) -> float:
     """A quantity in Q``q`` as a number of an event."""
     return a
 
 
-@by_type(lambda a, q: shift(mul(a, TO_DEGREES), q - 6 - TOLD_Q))
-def told_degrees(a: float, q: int) -> float:
+@by_type(lambda a, q: rounded_shift(multiply_q31(a, TO_DEGREES), q - 6 - TOLD_Q))
+def event_degrees(a: float, q: int) -> float:
     """An angle or rate in Q``q`` as a number of an event, deg or deg/s."""
     return a / DEG
 
 
 @kernel
-def tell(node: Any, code: int, a: float, b: float, c: float, d: float) -> None:
+def queue_event(node: Any, code: int, a: float, b: float, c: float, d: float) -> None:
     """Put an event with up to four numbers (``NONE``: none) into the ring; where it is full the oldest is lost.
 
-    In integers the numbers are in Q24. Further numbers are those of ``tell_more``.
+    In integers the numbers are in Q24. Further numbers are those of ``extend_event``.
     """
     events = node.events
     event = events.ring[events.told % EVENTS_KEPT]
@@ -105,7 +105,7 @@ def tell(node: Any, code: int, a: float, b: float, c: float, d: float) -> None:
 
 
 @kernel
-def tell_more(node: Any, first: int, a: float, b: float, c: float) -> None:
+def extend_event(node: Any, first: int, a: float, b: float, c: float) -> None:
     """Give the event told last three numbers more, from place ``first`` on."""
     events = node.events
     numbers = events.ring[(events.told - 1) % EVENTS_KEPT].numbers

@@ -1,4 +1,4 @@
-"""The border of the integer loop: configuration, state, readings and aiding between SI floats and Q formats.
+"""Conversion at the edge of the integer loop: configuration, state, readings and aiding, SI floats and Q formats.
 
 Here alone a float becomes an integer and an integer a float, beside the loop and never inside it: readings once a
 cycle, configuration and state when somebody changed them. What does not fit is held at the end of its range and
@@ -140,7 +140,7 @@ def show_aiding(fixed: Any, state: Any) -> None:
 
 
 @kernel
-def held(record: Any, value: float) -> int:
+def saturated_integer(record: Any, value: float) -> int:
     """Nearest integer of ``value``, ties to even, held within its range and then counted; NaN is 0 and counted."""
     nearest = np.rint(value)
     if abs(nearest) <= LIMIT:
@@ -155,14 +155,14 @@ def held(record: Any, value: float) -> int:
 def hold_vector(record: Any, made: Array, given: Array, scale: float) -> None:
     """Integers ``made`` (n,) of ``given`` (n,) times ``scale``, a power of two."""
     for k in range(made.shape[0]):
-        made[k] = held(record, given[k] * scale)
+        made[k] = saturated_integer(record, given[k] * scale)
 
 
 @kernel
 def hold_forces(record: Any, made: Array, given: Array, gravity: float) -> None:
     """Forces ``made`` (3, g, Q26) of ``given`` (3, m/s^2)."""
     for k in range(3):
-        made[k] = held(record, given[k] / gravity * 2.0**FORCE_Q)
+        made[k] = saturated_integer(record, given[k] / gravity * 2.0**FORCE_Q)
 
 
 @kernel
@@ -176,11 +176,11 @@ def whole_yaw(angle: float) -> int:
 @kernel
 def time_or_never(record: Any, time: float) -> int:
     """A time (s) in Q28, ``NEVER`` of one that is not finite."""
-    return held(record, time * 2.0**TIME_Q) if math.isfinite(time) else NEVER
+    return saturated_integer(record, time * 2.0**TIME_Q) if math.isfinite(time) else NEVER
 
 
 @kernel
-def room(variance: float) -> float:
+def ceiling_factor(variance: float) -> float:
     """Factor of a row and a column by which ``variance`` (Q56) comes down to its ceiling; 1 where it is not above."""
     return math.sqrt(HIGHEST / variance) if variance > HIGHEST else 1.0
 
@@ -195,11 +195,13 @@ def hold_covariance(record: Any, made: Array, given: Array, scale: Array) -> Non
     scale : (8, 8) the value of 1
     """
     for i in range(made.shape[0]):
-        row = room(given[i, i] * scale[i, i])
+        row = ceiling_factor(given[i, i] * scale[i, i])
         if row < 1.0:
             record.overflows += 1
         for j in range(made.shape[1]):
-            made[i, j] = held(record, given[i, j] * scale[i, j] * row * room(given[j, j] * scale[j, j]))
+            made[i, j] = saturated_integer(
+                record, given[i, j] * scale[i, j] * row * ceiling_factor(given[j, j] * scale[j, j])
+            )
 
 
 @kernel
@@ -219,11 +221,11 @@ def learn_state(fixed: Any, state: Any, gravity: float) -> None:
     for i in range(3):
         for j in range(3):
             share = state.survey_force_cov[i, j] / (gravity * gravity)
-            fixed.survey_force_cov[i, j] = held(fixed, share * 4.0**FORCE_Q)
+            fixed.survey_force_cov[i, j] = saturated_integer(fixed, share * 4.0**FORCE_Q)
     fixed.smoothing, fixed.surveyed_yaw = state.smoothing, state.surveyed_yaw
-    fixed.surveyed_var = held(fixed, state.surveyed_var * COVARIANCE[YAW, YAW])
+    fixed.surveyed_var = saturated_integer(fixed, state.surveyed_var * COVARIANCE[YAW, YAW])
     for j in range(STATES):
-        fixed.surveyed_with[j] = held(fixed, state.surveyed_with[j] * COVARIANCE[YAW, j])
+        fixed.surveyed_with[j] = saturated_integer(fixed, state.surveyed_with[j] * COVARIANCE[YAW, j])
     fixed.gain_q = 0
     for k in range(fixed.gain.shape[0]):
         fixed.ph[k] = fixed.rest[k] = fixed.gain[k] = 0
@@ -235,15 +237,21 @@ def learn_state(fixed: Any, state: Any, gravity: float) -> None:
 def learn_filter(fixed: Any, state: Any) -> None:
     """Read the filter, at its own epoch and predicted to now."""
     rate, vector = 2.0**RATE_Q, 2.0**VECTOR_Q
-    fixed.epoch, fixed.now = held(fixed, state.epoch * 2.0**TIME_Q), held(fixed, state.now * 2.0**TIME_Q)
+    fixed.epoch, fixed.now = (
+        saturated_integer(fixed, state.epoch * 2.0**TIME_Q),
+        saturated_integer(fixed, state.now * 2.0**TIME_Q),
+    )
     fixed.yaw, fixed.now_yaw, fixed.yaw_known = state.yaw, state.now_yaw, state.yaw_known
     hold_vector(fixed, fixed.down, state.down, vector)
     hold_vector(fixed, fixed.now_down, state.now_down, vector)
     hold_vector(fixed, fixed.static_bias, state.static_bias, rate)
     hold_vector(fixed, fixed.static_bias_var, state.static_bias_var, 2.0 ** (VAR_Q + 2 * UNIT))
     hold_vector(fixed, fixed.bias, state.bias, rate)
-    fixed.scale, fixed.stamp = held(fixed, state.scale * rate), held(fixed, state.stamp * rate)
-    fixed.now_rate = held(fixed, state.now_rate * rate)
+    fixed.scale, fixed.stamp = (
+        saturated_integer(fixed, state.scale * rate),
+        saturated_integer(fixed, state.stamp * rate),
+    )
+    fixed.now_rate = saturated_integer(fixed, state.now_rate * rate)
     hold_covariance(fixed, fixed.P, state.P, COVARIANCE)
     hold_covariance(fixed, fixed.now_P, state.now_P, COVARIANCE)
 
@@ -252,10 +260,10 @@ def learn_filter(fixed: Any, state: Any) -> None:
 def learn_aiding(fixed: Any, state: Any) -> None:
     """Read the reference, its age and the queue of measurements."""
     fixed.reference_hops, fixed.reference_offset = state.reference_hops, whole_yaw(state.reference_offset)
-    fixed.systematic_var = held(fixed, state.systematic_var * 2.0**VAR_Q)
+    fixed.systematic_var = saturated_integer(fixed, state.systematic_var * 2.0**VAR_Q)
     fixed.last_sequence, fixed.last_aided = state.last_sequence, time_or_never(fixed, state.last_aided)
-    fixed.innovation = held(fixed, state.innovation * 2.0**ANGLE_Q)
-    fixed.innovation_var = held(fixed, state.innovation_var * 2.0**VAR_Q)
+    fixed.innovation = saturated_integer(fixed, state.innovation * 2.0**ANGLE_Q)
+    fixed.innovation_var = saturated_integer(fixed, state.innovation_var * 2.0**VAR_Q)
     fixed.rejected, fixed.pending = state.rejected, state.pending
     hold_vector(fixed, fixed.pending_at, state.pending_at, 2.0**TIME_Q)
     hold_vector(fixed, fixed.pending_var, state.pending_var, 2.0**VAR_Q)
@@ -299,39 +307,39 @@ def learn_config(fixed: Any, config: Any, counter: Any) -> None:
     """
     one, unit2 = 2.0**VAR_Q, 4.0**UNIT
     fixed.changes = 0
-    fixed.attitude_var = held(counter, squared(config.attitude_factor) * 2.0**FACTOR_Q)
-    fixed.bias_factor_var = held(counter, squared(config.bias_factor) * 2.0**FACTOR_Q)
-    fixed.boot_bias_var = held(counter, squared(config.boot_bias_std) * unit2 * one)
-    fixed.scale_var = held(counter, squared(config.scale_std) * unit2 * one)
-    fixed.stamp_std, fixed.gravity = held(counter, config.stamp_std * 2.0**TIME_Q), 1 << FORCE_Q
+    fixed.attitude_var = saturated_integer(counter, squared_float(config.attitude_factor) * 2.0**FACTOR_Q)
+    fixed.bias_factor_var = saturated_integer(counter, squared_float(config.bias_factor) * 2.0**FACTOR_Q)
+    fixed.boot_bias_var = saturated_integer(counter, squared_float(config.boot_bias_std) * unit2 * one)
+    fixed.scale_var = saturated_integer(counter, squared_float(config.scale_std) * unit2 * one)
+    fixed.stamp_std, fixed.gravity = saturated_integer(counter, config.stamp_std * 2.0**TIME_Q), 1 << FORCE_Q
     for k in range(3):
-        noise, bias, tau = squared(config.gyro_noise[k]), squared(config.bias_std[k]), config.bias_tau[k]
-        walk = noise * squared(config.attitude_factor)
-        fixed.rate_noise[k] = held(counter, noise * unit2 * one)
-        fixed.twice_tau[k] = held(counter, 2.0 * tau * 2.0**TAU_Q)
-        fixed.walk[k] = held(counter, walk * one)
-        fixed.rate_walk[k] = held(counter, walk * unit2 * one)
-        fixed.noise_var[k] = held(counter, noise * one)
-        fixed.bias_var[k] = held(counter, bias * unit2 * one)
-        fixed.bias_drive[k] = held(counter, bias * squared(config.bias_factor) * unit2 * one)
-        fixed.bias_area[k] = held(counter, (noise + 2.0 * bias * tau) * unit2 * one)
-        fixed.bias_decay[k] = held(counter, LOG2_E / tau * 2.0**42)
-    fixed.still_walk_var = held(counter, squared(config.still_walk) * one)
+        noise, bias, tau = squared_float(config.gyro_noise[k]), squared_float(config.bias_std[k]), config.bias_tau[k]
+        walk = noise * squared_float(config.attitude_factor)
+        fixed.rate_noise[k] = saturated_integer(counter, noise * unit2 * one)
+        fixed.twice_tau[k] = saturated_integer(counter, 2.0 * tau * 2.0**TAU_Q)
+        fixed.walk[k] = saturated_integer(counter, walk * one)
+        fixed.rate_walk[k] = saturated_integer(counter, walk * unit2 * one)
+        fixed.noise_var[k] = saturated_integer(counter, noise * one)
+        fixed.bias_var[k] = saturated_integer(counter, bias * unit2 * one)
+        fixed.bias_drive[k] = saturated_integer(counter, bias * squared_float(config.bias_factor) * unit2 * one)
+        fixed.bias_area[k] = saturated_integer(counter, (noise + 2.0 * bias * tau) * unit2 * one)
+        fixed.bias_decay[k] = saturated_integer(counter, LOG2_E / tau * 2.0**42)
+    fixed.still_walk_var = saturated_integer(counter, squared_float(config.still_walk) * one)
     fixed.stamp_on = 1 if config.stamp_std > 0.0 else 0
-    fixed.stamp_var = held(counter, squared(config.stamp_std) * unit2 * one)
-    fixed.stamp_walk_var = held(counter, squared(config.stamp_walk) * unit2 * one)
-    fixed.aiding_floor_var = held(counter, config.aiding_floor_var * one)
-    fixed.force_var = held(counter, squared(config.force_std / config.gravity) * one)
-    fixed.gate_inverse = int(np.rint(2.0**LEVEL_Q / squared(max(config.gate, 1.0))))
-    fixed.rate_limit = held(counter, config.rate_limit * 2.0**RATE_Q)
-    fixed.still_rate = held(counter, config.still_rate * 2.0**RATE_Q)
+    fixed.stamp_var = saturated_integer(counter, squared_float(config.stamp_std) * unit2 * one)
+    fixed.stamp_walk_var = saturated_integer(counter, squared_float(config.stamp_walk) * unit2 * one)
+    fixed.aiding_floor_var = saturated_integer(counter, config.aiding_floor_var * one)
+    fixed.force_var = saturated_integer(counter, squared_float(config.force_std / config.gravity) * one)
+    fixed.gate_inverse = int(np.rint(2.0**LEVEL_Q / squared_float(max(config.gate, 1.0))))
+    fixed.rate_limit = saturated_integer(counter, config.rate_limit * 2.0**RATE_Q)
+    fixed.still_rate = saturated_integer(counter, config.still_rate * 2.0**RATE_Q)
     fixed.reject_limit, fixed.lag_cycles = config.reject_limit, config.lag_cycles
     fixed.survey_samples, fixed.settle_cycles = config.survey_samples, config.settle_cycles
     fixed.static_cycles = config.static_cycles
 
 
 @kernel
-def squared(value: float) -> float:
+def squared_float(value: float) -> float:
     """Value times itself."""
     return value * value
 

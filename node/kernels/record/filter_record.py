@@ -37,7 +37,7 @@ class Err(enum.IntEnum):
     STAMP = 7  # s, true time of validity of the aiding minus the node's idea of it
 
 
-class Status(enum.IntFlag):
+class CycleStatus(enum.IntFlag):
     """What one cycle did; each bit becomes an event or a message."""
 
     NONE = 0

@@ -1,7 +1,6 @@
-"""Memory of one node in integers: Q formats, units of the error states, state and configuration records.
+"""Memory of the filter in integers: records of its state and its configuration.
 
-A number in ``Qn`` is an integer that stands for itself times 2^-n. Biases, scale and stamp are counted in units of 2^-6
-of their SI unit, so that every variance fits one format, ``Q56`` of unit^2: see docs/decisions/0011-fixed-point.md.
+Formats and units are those of ``node.kernels.arithmetic.formats``.
 """
 
 from __future__ import annotations

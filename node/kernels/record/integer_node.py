@@ -1,8 +1,8 @@
 """All memory of a node in integers: the record of the floats, field by field, with a Q format for every float.
 
-Filter and configuration have records of their own (``layout``). Of the others the words lie as those of the floats
-do, so that showing and learning them is one loop over words with a table of scales; the quantities and their ranges
-are those of ``node.kernels.arithmetic.operations``. A word that holds a whole number is copied.
+Filter and configuration have records of their own (``integer_filter``). Of the others the words lie as those of the
+floats do, so that showing and learning them is one loop over words with a table of scales; the quantities and their
+ranges are those of ``node.kernels.arithmetic.operations``. A word that holds a whole number is copied.
 """
 
 from __future__ import annotations
@@ -222,15 +222,23 @@ FIXED_SETTINGS: Final = in_integers(SETTINGS)
 FIXED_PARAMETERS: Final = in_integers(PARAMETERS)
 
 
-def place(kind: np.dtype[Any], name: str) -> int:
+def word_offset(kind: np.dtype[Any], name: str) -> int:
     """Where a field lies, in words of 64 bits."""
     assert kind.fields is not None
     return kind.fields[name][1] // 8
 
 
-FILTER_AT, CONFIG_AT = place(NODE, "filter"), place(NODE, "config")
-AROUND_AT, RING_AT, CLUSTER_AT = place(NODE, "mount"), place(NODE, "events") + 2, place(NODE, "cluster")
-ALIGNER_AT, RECORDING_AT, END_AT = place(NODE, "aligner"), place(NODE, "recording"), place(NODE, "config")
+FILTER_AT, CONFIG_AT = word_offset(NODE, "filter"), word_offset(NODE, "config")
+AROUND_AT, RING_AT, CLUSTER_AT = (
+    word_offset(NODE, "mount"),
+    word_offset(NODE, "events") + 2,
+    word_offset(NODE, "cluster"),
+)
+ALIGNER_AT, RECORDING_AT, END_AT = (
+    word_offset(NODE, "aligner"),
+    word_offset(NODE, "recording"),
+    word_offset(NODE, "config"),
+)
 STATE_WORDS, CONFIG_WORDS = STATE.itemsize // 8, CONFIG.itemsize // 8
 SETTINGS_WORDS, PARAMETER_WORDS = SETTINGS.itemsize // 8, PARAMETERS.itemsize // 8
 AROUND_SCALES, AROUND_POWERS = scales_of(
@@ -265,8 +273,10 @@ INTEGERS: Final = np.dtype(
     ],
     align=True,
 )
-INSIDE: Final = place(INTEGERS, "node") + place(FIXED_NODE, "mount")  # where the words around the filter lie
-SETTINGS_INSIDE, PARAMETERS_INSIDE = place(INTEGERS, "settings"), place(INTEGERS, "parameters")
+INSIDE: Final = word_offset(INTEGERS, "node") + word_offset(
+    FIXED_NODE, "mount"
+)  # where the words around the filter lie
+SETTINGS_INSIDE, PARAMETERS_INSIDE = word_offset(INTEGERS, "settings"), word_offset(INTEGERS, "parameters")
 
 
 def new_integers() -> Array:

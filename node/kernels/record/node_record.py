@@ -298,7 +298,6 @@ SETTINGS: Final = np.dtype(
         ("state_every", "i8"),  # cycles
         ("torsion_gate", "i8"),  # 1: aiding under torque is not used
         ("joints", "i8"),  # 0 marks, 1 solved, 2 both
-        ("as_published", "i8"),  # 1: the published form, which knows no ramps
         ("stamp_walk", "f8"),  # s/sqrt(s), of one joint's clock
         ("rate_range", "f8"),  # rad/s
         ("force_range", "f8"),  # m/s^2

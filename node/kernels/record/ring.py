@@ -15,7 +15,7 @@ Number: TypeAlias = float  # or an integer in the format of the state given
 
 
 @kernel
-def push(state: Any, start: Number, end: Number, rate: Array, force: Array, quiet: int) -> None:
+def push_increments(state: Any, start: Number, end: Number, rate: Array, force: Array, quiet: int) -> None:
     """Write one cycle's increments: times on the node's clock, mean rate (3) and mean specific force (3)."""
     slot = state.cycles % RING
     state.ring_start[slot] = start

@@ -17,7 +17,7 @@ LIMIT: Final = float(1 << 60)
 
 
 @kernel
-def learnt(counter: Any, value: float, scale: float) -> int:
+def scaled_integer(counter: Any, value: float, scale: float) -> int:
     """The integer of a float; one that does not fit adds to ``counter.overflows``."""
     scaled = value * scale
     if abs(scaled) < LIMIT:
@@ -29,7 +29,7 @@ def learnt(counter: Any, value: float, scale: float) -> int:
 
 
 @kernel
-def shown(value: int, count: float) -> float:
+def scaled_float(value: int, count: float) -> float:
     """The float of an integer whose 1 is ``count``."""
     if value == NO_NUMBER:
         return math.nan
@@ -53,14 +53,14 @@ def learn_words(
         if scales[k] == 0.0:
             made[k] = words[k]
         else:
-            made[k] = learnt(counter, floats[k], scales[k] / power_of(gravity, powers[k]))
+            made[k] = scaled_integer(counter, floats[k], scales[k] / power_of(gravity, powers[k]))
 
 
 @kernel
 def learn_numbers(counter: Any, made: Array, floats: Array, scales: Array, powers: Array, gravity: float) -> None:
     """Integers ``made`` (n,) of ``floats`` that hold whole numbers where the scale is 1."""
     for k in range(floats.shape[0]):
-        made[k] = learnt(counter, floats[k], scales[k] / power_of(gravity, powers[k]))
+        made[k] = scaled_integer(counter, floats[k], scales[k] / power_of(gravity, powers[k]))
 
 
 @kernel
@@ -75,11 +75,11 @@ def show_words(
         if counts[k] == 0.0:
             words[k] = integers[k]
         else:
-            floats[k] = shown(integers[k], counts[k] * power_of(gravity, powers[k]))
+            floats[k] = scaled_float(integers[k], counts[k] * power_of(gravity, powers[k]))
 
 
 @kernel
-def differ(kept: Array, words: Array) -> bool:
+def words_differ(kept: Array, words: Array) -> bool:
     """Whether one of ``words`` (n,) is not as it was ``kept``; the loop has no exit, so that it is a fast one."""
     found = 0
     for k in range(words.shape[0]):
@@ -88,7 +88,7 @@ def differ(kept: Array, words: Array) -> bool:
 
 
 @kernel
-def keep(kept: Array, words: Array) -> None:
+def copy_words(kept: Array, words: Array) -> None:
     """Copy ``words`` (n,)."""
     for k in range(words.shape[0]):
         kept[k] = words[k]

@@ -10,33 +10,35 @@ import enum
 import math
 from typing import Any, Final
 
-from node.kernels.arithmetic.angles import wrap
-from node.kernels.arithmetic.circular import angle_of_turns, arcsine, reach, turns_of
+from node.kernels.arithmetic.angles import wrap_angle
+from node.kernels.arithmetic.circular import angle_of_turns, arcsine, planar_length, turns_of
 from node.kernels.arithmetic.formats import ANGLE_Q, DEG, FORCE_Q, PERIOD, RATE_Q, TURNS_Q, VECTOR_Q, WEIGHT_Q
-from node.kernels.arithmetic.integers import mul, shift
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import angle_of, by_type, half, is_number, turn
-from node.kernels.arithmetic.quantity import NONE, angle, factor, seconds
-from node.kernels.arithmetic.quantity import rate as of_rate
-from node.kernels.record.events import Code, tell, tell_more, told, told_count, told_degrees
+from node.kernels.arithmetic.integers import multiply_q31, rounded_shift
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import angle_of, by_type, half_of, is_number, turned_angle
+from node.kernels.arithmetic.quantity import NONE, angle_quantity, factor_quantity, time_quantity
+from node.kernels.arithmetic.quantity import rate_quantity as of_rate
+from node.kernels.record.events import Code, event_count, event_degrees, event_number, extend_event, queue_event
 from node.kernels.sensors.alignment import CIRCLE, fit_circle, take_extremes
 from node.kernels.sensors.cluster import all_used
-from node.kernels.sensors.realign import add_axes, realign
+from node.kernels.sensors.realign import add_axes, realign_filter
 from node.kernels.sensors.sweep import MOST_SAMPLES, add_to_sweep, clear_sweep
 
 SLOWEST, FASTEST = of_rate(2.0 * DEG), of_rate(15.0 * DEG)  # rad/s, of the turn
 BACKWARD: Final = of_rate(-2.0 * DEG)
-PATIENCE: Final = seconds(120.0)  # for the turn to begin
+PATIENCE: Final = time_quantity(120.0)  # for the turn to begin
 STEADY_CYCLES: Final = 3  # of turning, before the first that counts: those of the speeding up do not
 STOOD_CYCLES: Final = 4  # too slow in a row
-LARGEST_GAP: Final = seconds(5.0)  # between two cycles
-LARGEST_OVERLAP: Final = seconds(-PERIOD)
-LARGEST_STEP: Final = angle(3.0 * DEG)  # of the yaw in a cycle, beyond what the gyroscope turned
+LARGEST_GAP: Final = time_quantity(5.0)  # between two cycles
+LARGEST_OVERLAP: Final = time_quantity(-PERIOD)
+LARGEST_STEP: Final = angle_quantity(3.0 * DEG)  # of the yaw in a cycle, beyond what the gyroscope turned
 LEAST_LEAN: Final = 20  # standard errors: with less the readings do not show that they turned with the tube
-MOST_LEAN: Final = angle(60.0 * DEG)  # beyond it the middle of gravity's circle is near the centre: it is no axis
+MOST_LEAN: Final = angle_quantity(
+    60.0 * DEG
+)  # beyond it the middle of gravity's circle is near the centre: it is no axis
 SHAKING: Final = 5  # times the noise of a sample at rest
 LARGEST_OFFSET: Final = 10.0 * DEG  # of a mount; a block of parameters can hold no larger one either
-FARTHEST: Final = factor(math.sin(LARGEST_OFFSET))  # of the axis from z
+FARTHEST: Final = factor_quantity(math.sin(LARGEST_OFFSET))  # of the axis from z
 SLOWEST_TURN: Final = round(2.0 * math.pi / SLOWEST * 2.0 ** (28 - 7))  # s, Q21: 180
 
 
@@ -61,40 +63,50 @@ class Reason(enum.IntEnum):
 
 
 CYCLES_LOST, SENSOR_FAULTY, TOO_FAST = (
-    constant(Reason.CYCLES_LOST),
-    constant(Reason.SENSOR_FAULTY),
-    constant(Reason.TOO_FAST),
+    kernel_constant(Reason.CYCLES_LOST),
+    kernel_constant(Reason.SENSOR_FAULTY),
+    kernel_constant(Reason.TOO_FAST),
 )
-TURNED_BACK, NEVER_TURNED = constant(Reason.TURNED_BACK), constant(Reason.NEVER_TURNED)
+TURNED_BACK, NEVER_TURNED = kernel_constant(Reason.TURNED_BACK), kernel_constant(Reason.NEVER_TURNED)
 TOO_FEW_TURNS, TOO_LONG, NO_CIRCLE = (
-    constant(Reason.TOO_FEW_TURNS),
-    constant(Reason.TOO_LONG),
-    constant(Reason.NO_CIRCLE),
+    kernel_constant(Reason.TOO_FEW_TURNS),
+    kernel_constant(Reason.TOO_LONG),
+    kernel_constant(Reason.NO_CIRCLE),
 )
-SHAKES, LITTLE_LEAN, MUCH_LEAN = constant(Reason.SHAKES), constant(Reason.LITTLE_LEAN), constant(Reason.MUCH_LEAN)
-LARGE_OFFSET = constant(Reason.LARGE_OFFSET)
-BEGUN, TURNING, ALIGNED = constant(Code.ALIGNMENT_BEGUN), constant(Code.ALIGNMENT_TURNING), constant(Code.ALIGNED)
-REFUSED, DROPPED = constant(Code.ALIGNMENT_REFUSED), constant(Code.ALIGNMENT_DROPPED)
+SHAKES, LITTLE_LEAN, MUCH_LEAN = (
+    kernel_constant(Reason.SHAKES),
+    kernel_constant(Reason.LITTLE_LEAN),
+    kernel_constant(Reason.MUCH_LEAN),
+)
+LARGE_OFFSET = kernel_constant(Reason.LARGE_OFFSET)
+BEGUN, TURNING, ALIGNED = (
+    kernel_constant(Code.ALIGNMENT_BEGUN),
+    kernel_constant(Code.ALIGNMENT_TURNING),
+    kernel_constant(Code.ALIGNED),
+)
+REFUSED, DROPPED = kernel_constant(Code.ALIGNMENT_REFUSED), kernel_constant(Code.ALIGNMENT_DROPPED)
 
 
-@by_type(lambda wanted: PATIENCE + (mul(min(wanted, 1 << 31), SLOWEST_TURN) << 14))
-def longest(wanted: float) -> float:
+@by_type(lambda wanted: PATIENCE + (multiply_q31(min(wanted, 1 << 31), SLOWEST_TURN) << 14))
+def turning_time_limit(wanted: float) -> float:
     """The time (s) within which so many turns are done."""
     return PATIENCE + wanted * math.tau / SLOWEST
 
 
 def _inward(rate: int, place: int) -> int:
-    held = shift(rate, RATE_Q - VECTOR_Q)
-    return shift(shift(held * held, VECTOR_Q) * max(min(place, 1 << 31), -(1 << 31)), 2 * VECTOR_Q - FORCE_Q)
+    held = rounded_shift(rate, RATE_Q - VECTOR_Q)
+    return rounded_shift(
+        rounded_shift(held * held, VECTOR_Q) * max(min(place, 1 << 31), -(1 << 31)), 2 * VECTOR_Q - FORCE_Q
+    )
 
 
 @by_type(_inward)
-def inward(rate: float, place: float) -> float:
+def centripetal_force(rate: float, place: float) -> float:
     """Force (m/s^2) of a circle at ``place`` (m) from its middle; integers: of a turn that is slow enough."""
     return rate * rate * place
 
 
-@by_type(lambda tilt, noise: mul(tilt, min(noise, 1 << 31)) << (31 - WEIGHT_Q))
+@by_type(lambda tilt, noise: multiply_q31(tilt, min(noise, 1 << 31)) << (31 - WEIGHT_Q))
 def tilt_of(tilt: float, noise: float) -> float:
     """The noise of an IMU as a tilt, of the configuration's and its own share; integers: at most 128 of it."""
     return tilt * noise
@@ -109,15 +121,15 @@ def begin_alignment(node: Any, method: int, turns: float) -> None:
     aligner.steady, aligner.slow = 0, 0
     aligner.angle, aligner.sense = 0.0, 0.0
     node.mount.aligning = 1
-    tell(node, BEGUN, float(method), turns, NONE, NONE)
+    queue_event(node, BEGUN, float(method), turns, NONE, NONE)
 
 
 @kernel
 def refuse_alignment(node: Any, reason: int, imu: int, a: float, b: float) -> None:
     """End the alignment under way without an offset; ``a`` and ``b`` are numbers of the reason, ``imu`` 0 is all."""
     turned = node.aligner.angle
-    tell(node, REFUSED, told_count(turned, reason), turns_of(abs(turned)), told_count(turned, imu), a)
-    tell_more(node, 4, b, NONE, NONE)
+    queue_event(node, REFUSED, event_count(turned, reason), turns_of(abs(turned)), event_count(turned, imu), a)
+    extend_event(node, 4, b, NONE, NONE)
     end_alignment(node)
 
 
@@ -141,8 +153,8 @@ def drop_alignment(node: Any, settings: Any, reason: int) -> None:
     for k in range(mount.axis.shape[0]):
         mount.axis[k, 0], mount.axis[k, 1], mount.axis[k, 2] = 0.0, 0.0, 1.0
         mount.std[k, 0], mount.std[k, 1] = 0.0, 0.0
-    tell(node, DROPPED, float(reason), NONE, NONE, NONE)
-    realign(node, settings)
+    queue_event(node, DROPPED, float(reason), NONE, NONE, NONE)
+    realign_filter(node, settings)
 
 
 @kernel
@@ -160,22 +172,22 @@ def follow_alignment(node: Any, settings: Any, start: float, end: float) -> None
     if not is_number(aligner.last_end):
         aligner.ordered_at, aligner.last_end = start, start
     known = is_number(yaw) and is_number(aligner.yaw)
-    gap, turned, rate = start - aligner.last_end, wrap(yaw - aligner.yaw), state.now_rate
+    gap, turned, rate = start - aligner.last_end, wrap_angle(yaw - aligner.yaw), state.now_rate
     aligner.last_end, aligner.yaw = end, yaw
     if not LARGEST_OVERLAP < gap < LARGEST_GAP:
         refuse_alignment(node, CYCLES_LOST, 0, NONE, NONE)
     elif guard.gyro.fault != 0 or guard.force.fault != 0 or not all_used(node, settings):
         refuse_alignment(node, SENSOR_FAULTY, 0, NONE, NONE)
     elif abs(rate) > FASTEST:
-        refuse_alignment(node, TOO_FAST, 0, told_degrees(abs(rate), RATE_Q), NONE)
+        refuse_alignment(node, TOO_FAST, 0, event_degrees(abs(rate), RATE_Q), NONE)
     elif aligner.sense == 0:
         await_turn(node, settings, rate, end)
     elif rate * aligner.sense < BACKWARD:
         refuse_alignment(node, TURNED_BACK, 0, NONE, NONE)
     else:
-        moved = turn(rate, max(gap, 0) + end - start)
-        followed = known and abs(wrap(turned - moved)) < LARGEST_STEP  # where the yaw is set again it jumps
-        follow_turn(node, settings, rate, turned if followed else moved, turn(half(rate), end - start))
+        moved = turned_angle(rate, max(gap, 0) + end - start)
+        followed = known and abs(wrap_angle(turned - moved)) < LARGEST_STEP  # where the yaw is set again it jumps
+        follow_turn(node, settings, rate, turned if followed else moved, turned_angle(half_of(rate), end - start))
 
 
 @kernel
@@ -187,7 +199,7 @@ def await_turn(node: Any, settings: Any, rate: float, end: float) -> None:
         aligner.sense = 1 if rate > 0 else -1
         for k in range(settings.imus):
             clear_sweep(aligner.sweeps[k])
-        tell(node, TURNING, told_degrees(rate, RATE_Q), NONE, NONE, NONE)
+        queue_event(node, TURNING, event_degrees(rate, RATE_Q), NONE, NONE, NONE)
     elif end - aligner.ordered_at > PATIENCE:
         refuse_alignment(node, NEVER_TURNED, 0, NONE, NONE)
 
@@ -198,18 +210,18 @@ def follow_turn(node: Any, settings: Any, rate: float, turned: float, rest: floa
     aligner, force = node.aligner, node.aligner.force
     aligner.slow = aligner.slow + 1 if abs(rate) < SLOWEST else 0
     if aligner.slow >= STOOD_CYCLES:
-        refuse_alignment(node, TOO_FEW_TURNS, 0, told(aligner.wanted, TURNS_Q), NONE)
+        refuse_alignment(node, TOO_FEW_TURNS, 0, event_number(aligner.wanted, TURNS_Q), NONE)
         return
-    late = aligner.last_end - aligner.ordered_at > longest(aligner.wanted)
+    late = aligner.last_end - aligner.ordered_at > turning_time_limit(aligner.wanted)
     if late or aligner.sweeps[0].samples >= MOST_SAMPLES:
-        refuse_alignment(node, TOO_LONG, 0, told(aligner.wanted, TURNS_Q), NONE)
+        refuse_alignment(node, TOO_LONG, 0, event_number(aligner.wanted, TURNS_Q), NONE)
         return
     aligner.angle += turned
     for k in range(settings.imus):
         for i in range(3):
             force[i] = node.unaligned[k, i]
         for i in range(2):
-            force[i] += inward(rate, settings.place[k, i])  # the circle around the axis pulls inwards
+            force[i] += centripetal_force(rate, settings.place[k, i])  # the circle around the axis pulls inwards
         add_to_sweep(aligner.sweeps[k], force, aligner.angle - rest)
     if abs(aligner.angle) >= angle_of_turns(aligner.wanted):
         finish_alignment(node, settings)
@@ -237,27 +249,29 @@ def finish_alignment(node: Any, settings: Any) -> None:
         for i in range(3):
             mount.axis[k, i] = offset.axis[i]
         mount.std[k, 0], mount.std[k, 1] = offset.pitch_std, offset.roll_std
-        turned, pitch, roll = aligner.angle, told_degrees(offset.pitch, ANGLE_Q), told_degrees(offset.roll, ANGLE_Q)
-        stds = told_degrees(offset.pitch_std, ANGLE_Q), told_degrees(offset.roll_std, ANGLE_Q)
-        lean, noise = told_degrees(offset.lean, ANGLE_Q), told_degrees(offset.noise, ANGLE_Q)
-        tell(node, ALIGNED, told_count(turned, k + 1), told_count(turned, aligner.method), turns_of(abs(turned)), pitch)
-        tell_more(node, 4, roll, stds[0], stds[1])
-        tell_more(node, 7, lean, noise, told_count(turned, aligner.sweeps[k].samples))
+        turned, pitch, roll = aligner.angle, event_degrees(offset.pitch, ANGLE_Q), event_degrees(offset.roll, ANGLE_Q)
+        stds = event_degrees(offset.pitch_std, ANGLE_Q), event_degrees(offset.roll_std, ANGLE_Q)
+        lean, noise = event_degrees(offset.lean, ANGLE_Q), event_degrees(offset.noise, ANGLE_Q)
+        queue_event(
+            node, ALIGNED, event_count(turned, k + 1), event_count(turned, aligner.method), turns_of(abs(turned)), pitch
+        )
+        extend_event(node, 4, roll, stds[0], stds[1])
+        extend_event(node, 7, lean, noise, event_count(turned, aligner.sweeps[k].samples))
     mount.method = aligner.method
     end_alignment(node)
-    realign(node, settings)
+    realign_filter(node, settings)
 
 
 @kernel
 def judge_offset(offset: Any, noise: float) -> tuple[int, float, float]:
     """Why an offset is none, 0 when it is one, and two numbers of the reason; ``noise`` (rad) of a sample at rest."""
-    size = reach(offset.axis[0], offset.axis[1])
+    size = planar_length(offset.axis[0], offset.axis[1])
     if offset.noise > SHAKING * noise:
-        return SHAKES, told_degrees(offset.noise, ANGLE_Q), told_degrees(SHAKING * noise, ANGLE_Q)
+        return SHAKES, event_degrees(offset.noise, ANGLE_Q), event_degrees(SHAKING * noise, ANGLE_Q)
     if offset.lean < LEAST_LEAN * offset.lean_std:
-        return LITTLE_LEAN, told_degrees(offset.lean, ANGLE_Q), told_degrees(LEAST_LEAN * offset.lean_std, ANGLE_Q)
+        return LITTLE_LEAN, event_degrees(offset.lean, ANGLE_Q), event_degrees(LEAST_LEAN * offset.lean_std, ANGLE_Q)
     if offset.lean > MOST_LEAN:
-        return MUCH_LEAN, told_degrees(offset.lean, ANGLE_Q), NONE
+        return MUCH_LEAN, event_degrees(offset.lean, ANGLE_Q), NONE
     if size > FARTHEST:
-        return LARGE_OFFSET, told_degrees(arcsine(size), ANGLE_Q), NONE
+        return LARGE_OFFSET, event_degrees(arcsine(size), ANGLE_Q), NONE
     return 0, NONE, NONE

@@ -14,7 +14,16 @@ from typing import Any, Final
 from node.kernels.arithmetic.circular import arcsine, arctangent
 from node.kernels.arithmetic.formats import Array
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.operations import by_type, fraction, half, length, mean, over, taken_where, times
+from node.kernels.arithmetic.operations import (
+    bounded_ratio,
+    by_type,
+    half_of,
+    mean_of_total,
+    over_factor,
+    taken_where,
+    times_factor,
+    vector_length,
+)
 from node.kernels.arithmetic.quantity import ONE
 from node.kernels.sensors.integer_circle import fit_in_integers, holds_integer_sums
 from node.kernels.sensors.integer_extremes import LIMIT, PHASES, STEP, std_in_integers
@@ -32,11 +41,11 @@ def to_tube(axis: Array, vector: Array) -> None:
     """
     if axis[0] == 0 and axis[1] == 0:
         return
-    across = times(vector[0], axis[0]) + times(vector[1], axis[1])
-    pull = over(across, ONE + axis[2]) + vector[2]
-    vector[0] -= times(pull, axis[0])
-    vector[1] -= times(pull, axis[1])
-    vector[2] = across + times(vector[2], axis[2])
+    across = times_factor(vector[0], axis[0]) + times_factor(vector[1], axis[1])
+    pull = over_factor(across, ONE + axis[2]) + vector[2]
+    vector[0] -= times_factor(pull, axis[0])
+    vector[1] -= times_factor(pull, axis[1])
+    vector[2] = across + times_factor(vector[2], axis[2])
 
 
 @kernel
@@ -124,10 +133,10 @@ def take_extremes(sweep: Any, offset: Any) -> int:
     """
     if fit_circle(sweep, offset) == 0:
         return 0
-    x = half(sweep.largest[0] + sweep.least[0])
-    y = half(sweep.largest[1] + sweep.least[1])
+    x = half_of(sweep.largest[0] + sweep.least[0])
+    y = half_of(sweep.largest[1] + sweep.least[1])
     std = extreme_std(offset.lean, offset.noise, sweep.samples)
-    place_axis(offset, x, y, mean(sweep.sum[2], sweep.samples), std)
+    place_axis(offset, x, y, mean_of_total(sweep.sum[2], sweep.samples), std)
     return 1
 
 
@@ -141,12 +150,16 @@ def extreme_std(lean: float, noise: float, samples: int) -> float:
 @kernel
 def place_axis(offset: Any, x: float, y: float, z: float, std: float) -> None:
     """Axis, pitch and roll of a middle (x, y, z) of gravity's directions; ``std`` of x and of y."""
-    size = length(x, y, z)
-    offset.axis[0], offset.axis[1], offset.axis[2] = fraction(x, size), fraction(y, size), fraction(z, size)
+    size = vector_length(x, y, z)
+    offset.axis[0], offset.axis[1], offset.axis[2] = (
+        bounded_ratio(x, size),
+        bounded_ratio(y, size),
+        bounded_ratio(z, size),
+    )
     offset.pitch = arcsine(offset.axis[0])
     offset.roll = arctangent(offset.axis[1], offset.axis[2])
-    offset.pitch_std = over(std, size)
-    offset.roll_std = over(std, size)
+    offset.pitch_std = over_factor(std, size)
+    offset.roll_std = over_factor(std, size)
 
 
 @kernel

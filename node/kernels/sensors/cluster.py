@@ -9,9 +9,16 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.arithmetic.formats import Array
-from node.kernels.arithmetic.integers import mul, quotient
+from node.kernels.arithmetic.integers import multiply_q31, quotient_q30
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.operations import by_type, fraction, mean, square, times, within
+from node.kernels.arithmetic.operations import (
+    angular_square,
+    bounded_deviation,
+    bounded_ratio,
+    by_type,
+    mean_of_total,
+    times_factor,
+)
 from node.kernels.arithmetic.quantity import NONE
 from node.kernels.filter.priors import set_noise
 from node.kernels.filter.resets import doubt_bias
@@ -24,15 +31,15 @@ from node.kernels.string.encoder_rate import is_heard
 MEMORY: Final = 1000  # cycles at rest, of the running mean of an offset
 
 
-@by_type(lambda a, weight, total: times(a, quotient(weight, total)))
-def weighed(a: float, weight: float, total: float) -> float:
+@by_type(lambda a, weight, total: times_factor(a, quotient_q30(weight, total)))
+def weighted_share(a: float, weight: float, total: float) -> float:
     """A share of a weighted mean, that ``of_weighed`` makes of their sum; integers divide here."""
     return weight * a
 
 
 @by_type(lambda a, total: a)
 def of_weighed(a: float, total: float) -> float:
-    """A sum of what was ``weighed``, as the mean."""
+    """A sum of what was ``weighted_share``, as the mean."""
     return a / total
 
 
@@ -42,14 +49,14 @@ def noise_share(own: float) -> float:
     return own * own
 
 
-@by_type(lambda part, std: mul(part, min(int(square(std)) >> 16, 1 << 31)) << 7)
+@by_type(lambda part, std: multiply_q31(part, min(int(angular_square(std)) >> 16, 1 << 31)) << 7)
 def part_of(part: float, std: float) -> float:
     """The part (Q40) of the variance of a rate (rad/s, of at most 0.04 deg/s in integers)."""
     return part * std**2
 
 
 @kernel
-def fuse(readings: Array, weights: Array, fused: Array) -> None:
+def fuse_readings(readings: Array, weights: Array, fused: Array) -> None:
     """Inverse-variance mean sum w_i x_i / sum w_i into ``fused`` (k). Source: thesis eq. 3.42.
 
     Parameters
@@ -65,7 +72,7 @@ def fuse(readings: Array, weights: Array, fused: Array) -> None:
     for i in range(weights.shape[0]):
         if weights[i] > 0:
             for j in range(fused.shape[0]):
-                fused[j] += weighed(readings[i, j], weights[i], total)
+                fused[j] += weighted_share(readings[i, j], weights[i], total)
     for j in range(fused.shape[0]):
         fused[j] = of_weighed(fused[j], total)
 
@@ -78,7 +85,7 @@ def follow_offsets(rates: Array, fused: Array, samples: int, offsets: Array) -> 
     """
     for i in range(rates.shape[0]):
         for j in range(3):
-            offsets[i, j] += mean(rates[i, j] - fused[j] - offsets[i, j], samples)
+            offsets[i, j] += mean_of_total(rates[i, j] - fused[j] - offsets[i, j], samples)
 
 
 @kernel
@@ -93,7 +100,7 @@ def fuse_imus(node: Any, settings: Any, readings: Array) -> None:
     compare_imus(node, settings)
     count = choose_imus(cluster, settings.imus)
     if tell_members(node, settings.imus) and count > 0:
-        reweigh(node, settings)
+        reweigh_cluster(node, settings)
     slot = cluster.cycles % RING
     for k in range(settings.imus):
         cluster.used[k] = cluster.chosen[k]
@@ -112,7 +119,7 @@ def fuse_imus(node: Any, settings: Any, readings: Array) -> None:
 def take_mean(readings: Array, weights: Array, count: int, fused: Array, rate: Array, force: Array) -> None:
     """Fused ``rate`` (3) and ``force`` (3) of the ``count`` IMUs in use; ``fused`` (6) is work space."""
     if count > 0:
-        fuse(readings, weights, fused)
+        fuse_readings(readings, weights, fused)
     for i in range(3):
         rate[i] = fused[i] if count > 0 else NONE
         force[i] = fused[3 + i] if count > 0 else NONE
@@ -125,7 +132,7 @@ def mean_temperature(readings: Array, used: Array, imus: int, count: int) -> flo
     for k in range(imus):
         if used[k] == 1:
             total += readings[k, TEMPERATURE]
-    return mean(total, count) if count > 0 else USUAL
+    return mean_of_total(total, count) if count > 0 else USUAL
 
 
 @kernel
@@ -147,7 +154,7 @@ def expect_reading(node: Any, imus: int) -> None:
         if not held:
             cluster.expected[i] = rate
         cluster.expects[i] = cluster.expected[i]
-        cluster.expects[3 + i] = -times(node.config.gravity, state.now_down[i])
+        cluster.expects[3 + i] = -times_factor(node.config.gravity, state.now_down[i])
 
 
 @kernel
@@ -155,11 +162,11 @@ def begin_cluster(node: Any, settings: Any) -> None:
     """Weigh the IMUs in use for the first time in a session."""
     for k in range(settings.imus):
         node.cluster.chosen[k] = node.cluster.used[k]
-    reweigh(node, settings)
+    reweigh_cluster(node, settings)
 
 
 @kernel
-def reweigh(node: Any, settings: Any) -> None:
+def reweigh_cluster(node: Any, settings: Any) -> None:
     """Noise of the configuration in use for the IMUs chosen, and the doubt in a bias that is now another mean.
 
     var(b' - b) = sigma_b^2 sum (w'_i - w_i)^2 noise_i^2: every gyroscope wanders by itself.
@@ -172,9 +179,9 @@ def reweigh(node: Any, settings: Any) -> None:
         before += settings.weight[k] if cluster.used[k] == 1 else 0
         after += settings.weight[k] if cluster.chosen[k] == 1 else 0
     for k in range(settings.imus):
-        moved = fraction(settings.weight[k], after) if cluster.chosen[k] == 1 else 0
-        moved -= fraction(settings.weight[k], before) if cluster.used[k] == 1 else 0
-        changed += noise_share(times(settings.noise[k], moved))
+        moved = bounded_ratio(settings.weight[k], after) if cluster.chosen[k] == 1 else 0
+        moved -= bounded_ratio(settings.weight[k], before) if cluster.used[k] == 1 else 0
+        changed += noise_share(times_factor(settings.noise[k], moved))
     set_noise(config, settings, after)
     for i in range(3):
         doubt_bias(node.filter, i, part_of(changed, settings.plain_bias_std[i]))
@@ -197,7 +204,7 @@ def learn_offsets(node: Any, settings: Any) -> None:
         return
     mount.rate_samples = min(mount.rate_samples + 1, MEMORY)
     middle = cluster.fused[:3]
-    fuse(cluster.rates[:], cluster.weights, middle)
+    fuse_readings(cluster.rates[:], cluster.weights, middle)
     follow_offsets(cluster.rates[:imus], middle, mount.rate_samples, mount.rate_offset)
 
 
@@ -215,23 +222,25 @@ def survey_imus(node: Any, settings: Any, samples: int) -> None:
                 used = 0
         cluster.survey_used[k] = used
         if used == 1:
-            average(cluster, cluster.ring_force[k], samples, cluster.survey_force[k], cluster.survey_force_cov[k])
+            average_ring_forces(
+                cluster, cluster.ring_force[k], samples, cluster.survey_force[k], cluster.survey_force_cov[k]
+            )
 
 
 @kernel
-def average(cluster: Any, forces: Array, samples: int, middle: Array, cov: Array) -> None:
+def average_ring_forces(cluster: Any, forces: Array, samples: int, middle: Array, cov: Array) -> None:
     """Mean (3) of the newest ``samples`` of a ring of ``forces`` (RING, 3) and its covariance (3, 3)."""
     first = cluster.cycles - samples
     for i in range(3):
         middle[i] = 0
         for n in range(samples):
             middle[i] += forces[(first + n) % RING, i]
-        middle[i] = mean(middle[i], samples)
+        middle[i] = mean_of_total(middle[i], samples)
     for i in range(3):
         for j in range(i, 3):
             total: float = 0
             for n in range(samples):
                 slot = (first + n) % RING
-                total += within(forces[slot, i] - middle[i]) * within(forces[slot, j] - middle[j])
-            cov[i, j] = mean(total, samples * (samples - 1))
+                total += bounded_deviation(forces[slot, i] - middle[i]) * bounded_deviation(forces[slot, j] - middle[j])
+            cov[i, j] = mean_of_total(total, samples * (samples - 1))
             cov[j, i] = cov[i, j]

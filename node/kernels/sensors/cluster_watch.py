@@ -10,24 +10,24 @@ import math
 from typing import Any, Final
 
 from node.kernels.arithmetic.formats import DEG, Array
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import half, number, ratio, times
-from node.kernels.arithmetic.quantity import NO_NUMBER, NONE, Constant, factor, force, rate
-from node.kernels.record.events import Code, tell, told_count
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import as_number, half_of, quantity_ratio, times_factor
+from node.kernels.arithmetic.quantity import NO_NUMBER, NONE, Constant, factor_quantity, force_quantity, rate_quantity
+from node.kernels.record.events import Code, event_count, queue_event
 from node.kernels.record.node_record import FX, SATURATED, WX
 from node.kernels.sensors.sensor_watch import find_faults
 
 DISAGREEING: Final = 4  # cycles in a row, until an IMU is left out
 HEALTHY: Final = 20  # cycles in a row, until it is back
 LEARNT: Final = 32  # cycles at rest, after which offsets show a disagreement
-RATE_APART, FORCE_APART = rate(0.5 * DEG), force(0.3)  # rad/s, m/s^2, between IMUs that agree
-SPIN_APART: Final = factor(0.02)  # of the spin, on each axis: what scale and mount may be off by
+RATE_APART, FORCE_APART = rate_quantity(0.5 * DEG), force_quantity(0.3)  # rad/s, m/s^2, between IMUs that agree
+SPIN_APART: Final = factor_quantity(0.02)  # of the spin, on each axis: what scale and mount may be off by
 UNALIGNED_APART, UNALIGNED_SPIN = (
-    force(1.0),
-    factor(0.2),
+    force_quantity(1.0),
+    factor_quantity(0.2),
 )  # the same of mounts never aligned; along the axis the spin counts as above
 CLEARLY: Final = 2  # times farther from what is expected: of two that disagree, the one to leave out
-IMU_EXCLUDED, IMU_BACK = constant(Code.IMU_EXCLUDED), constant(Code.IMU_BACK)
+IMU_EXCLUDED, IMU_BACK = kernel_constant(Code.IMU_EXCLUDED), kernel_constant(Code.IMU_BACK)
 INFINITE: Final = Constant(math.inf, NO_NUMBER)
 
 
@@ -66,7 +66,7 @@ def set_limits(limits: Array, mount: Any, spin: float) -> None:
     """Largest differences (6) of rate and force between IMUs that agree while they turn with ``spin`` (rad/s)."""
     aligned = mount.method != 0
     for i in range(3):
-        turning = times(spin, SPIN_APART) if aligned or i == 2 else times(spin, UNALIGNED_SPIN)
+        turning = times_factor(spin, SPIN_APART) if aligned or i == 2 else times_factor(spin, UNALIGNED_SPIN)
         limits[i] = RATE_APART + turning if mount.rate_samples >= LEARNT else INFINITE
         if aligned:
             limits[3 + i] = FORCE_APART
@@ -78,15 +78,15 @@ def set_limits(limits: Array, mount: Any, spin: float) -> None:
 def find_middle(cluster: Any, imus: int, trusted: int) -> bool:
     """What the ``trusted`` IMUs read, into ``cluster.middle`` (6); False when two differ and either may be right."""
     for i in range(6):
-        cluster.middle[i] = median(cluster, imus, i)
+        cluster.middle[i] = median_reading(cluster, imus, i)
     if trusted != 2:
         return True
     first = next_trusted(cluster, 0)
     second = next_trusted(cluster, first + 1)
     if is_near(cluster.readings[first], cluster.readings[second], cluster.limits):
         return True
-    one = distance(cluster.readings[first], cluster.expects, cluster.limits)
-    other = distance(cluster.readings[second], cluster.expects, cluster.limits)
+    one = reading_distance(cluster.readings[first], cluster.expects, cluster.limits)
+    other = reading_distance(cluster.readings[second], cluster.expects, cluster.limits)
     if max(one, other) < CLEARLY * min(one, other):
         return False
     nearer = first if one < other else second
@@ -104,7 +104,7 @@ def next_trusted(cluster: Any, imu: int) -> int:
 
 
 @kernel
-def median(cluster: Any, imus: int, axis: int) -> float:
+def median_reading(cluster: Any, imus: int, axis: int) -> float:
     """Median of what the sane IMUs in use read on ``axis``; of an even number the mean of the two in the middle."""
     values, count = cluster.ordered, 0
     for k in range(imus):
@@ -117,7 +117,7 @@ def median(cluster: Any, imus: int, axis: int) -> float:
         values[place] = value
         count += 1
     middle = count // 2
-    return number(values[middle] if count % 2 == 1 else half(values[middle - 1] + values[middle]))
+    return as_number(values[middle] if count % 2 == 1 else half_of(values[middle - 1] + values[middle]))
 
 
 @kernel
@@ -130,11 +130,11 @@ def is_near(one: Array, other: Array, limits: Array) -> bool:
 
 
 @kernel
-def distance(one: Array, other: Array, limits: Array) -> float:
+def reading_distance(one: Array, other: Array, limits: Array) -> float:
     """Largest difference of two readings (6), in units of ``limits``."""
     largest: float = 0
     for i in range(6):
-        largest = max(largest, ratio(abs(one[i] - other[i]), limits[i]))
+        largest = max(largest, quantity_ratio(abs(one[i] - other[i]), limits[i]))
     return largest
 
 
@@ -168,8 +168,8 @@ def tell_members(node: Any, imus: int) -> bool:
             continue
         changed = True
         if cluster.chosen[k] == 1:
-            tell(node, IMU_BACK, told_count(node.temperature, k + 1), NONE, NONE, NONE)
+            queue_event(node, IMU_BACK, event_count(node.temperature, k + 1), NONE, NONE, NONE)
         else:
-            fault = told_count(node.temperature, cluster.faults[k])
-            tell(node, IMU_EXCLUDED, told_count(node.temperature, k + 1), fault, NONE, NONE)
+            fault = event_count(node.temperature, cluster.faults[k])
+            queue_event(node, IMU_EXCLUDED, event_count(node.temperature, k + 1), fault, NONE, NONE)
     return changed

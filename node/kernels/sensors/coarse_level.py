@@ -10,17 +10,17 @@ import math
 from typing import Any, Final
 
 from node.kernels.arithmetic.formats import DEG, Array
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import fraction, length, times
-from node.kernels.arithmetic.quantity import factor, rate, variance
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import bounded_ratio, times_factor, vector_length
+from node.kernels.arithmetic.quantity import factor_quantity, rate_quantity, variance_quantity
 from node.kernels.record.filter_record import Err
-from node.kernels.sensors.sensor_watch import largest
+from node.kernels.sensors.sensor_watch import largest_magnitude
 
-TX, TY = constant(Err.TILT_X), constant(Err.TILT_Y)
-UNKNOWN_VAR: Final = variance(0.25)  # rad^2 of tilt, above which nothing is known that a reading could spoil
-SLOWEST: Final = rate(6.0 * DEG)  # rad/s, up to which a mean over a cycle is that of one attitude
-GRAVITY_ERROR: Final = factor(0.05)  # of gravity, at rest
-FAR_OFF: Final = factor(1.0 - math.cos(0.1))  # of an upright tube; more is not left to the linear levelling
+TX, TY = kernel_constant(Err.TILT_X), kernel_constant(Err.TILT_Y)
+UNKNOWN_VAR: Final = variance_quantity(0.25)  # rad^2 of tilt, above which nothing is known that a reading could spoil
+SLOWEST: Final = rate_quantity(6.0 * DEG)  # rad/s, up to which a mean over a cycle is that of one attitude
+GRAVITY_ERROR: Final = factor_quantity(0.05)  # of gravity, at rest
+FAR_OFF: Final = factor_quantity(1.0 - math.cos(0.1))  # of an upright tube; more is not left to the linear levelling
 
 
 @kernel
@@ -28,12 +28,17 @@ def level_coarsely(state: Any, config: Any, turning: Array, force: Array) -> Non
     """Take the direction of a slow node's specific force (3, m/s^2) if its tilt is unknown; ``turning`` in rad/s."""
     if min(state.P[TX, TX], state.P[TY, TY]) < UNKNOWN_VAR:
         return
-    weight = length(force[0], force[1], force[2])
-    if abs(weight - config.gravity) > times(config.gravity, GRAVITY_ERROR) or largest(turning) > SLOWEST:
+    weight = vector_length(force[0], force[1], force[2])
+    if (
+        abs(weight - config.gravity) > times_factor(config.gravity, GRAVITY_ERROR)
+        or largest_magnitude(turning) > SLOWEST
+    ):
         return
     down = state.down
-    along = times(force[0], down[0]) + times(force[1], down[1]) + times(force[2], down[2])
-    linear = times(FAR_OFF, times(down[2], down[2]))  # of one that lies a turn about its axis is many across it
-    if -along < weight - times(weight, linear):
+    along = times_factor(force[0], down[0]) + times_factor(force[1], down[1]) + times_factor(force[2], down[2])
+    linear = times_factor(
+        FAR_OFF, times_factor(down[2], down[2])
+    )  # of one that lies a turn about its axis is many across it
+    if -along < weight - times_factor(weight, linear):
         for k in range(3):
-            down[k] = -fraction(force[k], weight)
+            down[k] = -bounded_ratio(force[k], weight)

@@ -15,7 +15,15 @@ from typing import Any, Final
 
 from node.kernels.arithmetic.formats import Array
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.operations import half, is_number, mean, share, speed, square, turn
+from node.kernels.arithmetic.operations import (
+    angular_square,
+    half_of,
+    is_number,
+    mean_of_total,
+    proportional_share,
+    turned_angle,
+    turning_rate,
+)
 from node.kernels.arithmetic.quantity import NONE
 
 MEMORY: Final = 256  # windows, over which an error that has grown is taken for one that stays
@@ -30,7 +38,7 @@ def date_window(memory: Any, std: float) -> None:
     """
     known = is_number(memory.late) and memory.late != 0
     memory.std = std
-    memory.lasting = min(memory.lasting + mean(std - memory.lasting, MEMORY), std) if known else std
+    memory.lasting = min(memory.lasting + mean_of_total(std - memory.lasting, MEMORY), std) if known else std
 
 
 @kernel
@@ -51,17 +59,17 @@ def make_up_delay(memory: Any, late: float, rate: Array, length: float) -> float
     for k in range(3):
         measured = rate[k]
         change = measured - memory.rate[k] if known else 0
-        bent = share(half(change), window + late, length)
+        bent = proportional_share(half_of(change), window + late, length)
         ahead = min(max(bent, -abs(measured)), abs(measured))  # not back through 0
         if k == 2 and memory.told == 1:
             ahead = memory.ahead
-        missing = turn(measured + ahead, late)
+        missing = turned_angle(measured + ahead, late)
         if k == 2 and memory.told == 1 and memory.joins == 1 and known:
-            shown = turn(measured + memory.behind, memory.late)
+            shown = turned_angle(measured + memory.behind, memory.late)
             memory.shown, memory.missing[k] = shown - memory.missing[k], shown
         if known and not exact:
-            rate[k] = speed(turn(measured, window) + missing - memory.missing[k], length)
+            rate[k] = turning_rate(turned_angle(measured, window) + missing - memory.missing[k], length)
         bend = change - memory.change[k]
         memory.rate[k], memory.missing[k], memory.change[k] = measured, missing, change
     memory.late = late
-    return square(turn(bend, half(late))) if known and memory.told == 0 else 0
+    return angular_square(turned_angle(bend, half_of(late))) if known and memory.told == 0 else 0

@@ -11,9 +11,9 @@ from typing import Final
 import numpy as np
 
 from node.kernels.arithmetic.formats import ANGLE_Q, VECTOR_Q
-from node.kernels.arithmetic.integers import mul, quotient, root_of, shift
+from node.kernels.arithmetic.integers import multiply_q31, quotient_q30, root_of, rounded_shift
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.trigonometry import counts, exponential, sine_cosine
+from node.kernels.arithmetic.trigonometry import exponential_decay, radians_to_counts, sine_cosine
 
 LIMIT, STEP = 8.0, 0.1  # sigmas, range and step of the integrals over the law of an extreme
 PHASES: Final = 4  # of the sampling against the extremes, over which their law is averaged
@@ -33,19 +33,19 @@ ONE: Final = 1 << VECTOR_Q
 
 
 @kernel
-def law(z: int, ratio: int, samples: int, phase: int) -> int:
+def nonexceedance_probability(z: int, ratio: int, samples: int, phase: int) -> int:
     """How probable it is (Q31) that no sample is above the radius by ``z`` sigmas (Q24)."""
     total = 0
     for k in range(samples):
         cosine = sine_cosine((((k << 3) + 2 * phase + 1) << 32) // (samples << 3))[1]
-        level = z + (mul(ratio, max(ONE - cosine, 0)) << 1) - LOWEST
+        level = z + (multiply_q31(ratio, max(ONE - cosine, 0)) << 1) - LOWEST
         cell = level >> CELL_Q
         if cell < LOGS.shape[0] - 1:
             beyond = level & ((1 << CELL_Q) - 1)
             total += LOGS[cell] - (((LOGS[cell] - LOGS[cell + 1]) * beyond) >> CELL_Q)
         if total > NOTHING:
             return 0
-    return exponential(total << 10, 1 << 28)
+    return exponential_decay(total << 10, 1 << 28)
 
 
 @kernel
@@ -55,18 +55,18 @@ def variance_in_integers(ratio: int, samples: int) -> int:
     for phase in range(PHASES):
         below = 0
         for m in range(1, COUNT + 1):
-            above = law(LOWEST + (m << LEVEL_Q) // 10, ratio, samples, phase)
+            above = nonexceedance_probability(LOWEST + (m << LEVEL_Q) // 10, ratio, samples, phase)
             middle = 2 * m - 1 - COUNT
             first += (above - below) * middle
             second += (above - below) * middle * middle
             below = above
-    mean = shift(first // PHASES, 8)
+    mean = rounded_shift(first // PHASES, 8)
     spread = max((second // PHASES << 15) - mean * mean, 0)
-    return shift(mul(spread, HALF_STEP_SQUARED), 8)
+    return rounded_shift(multiply_q31(spread, HALF_STEP_SQUARED), 8)
 
 
 def std_in_integers(lean: int, noise: int, samples: int) -> int:
     """As ``node.kernels.sensors.alignment.extreme_std``, rad in Q40."""
-    sine = sine_cosine(counts(lean, ANGLE_Q))[0]
-    ratio = min(quotient(sine << 4, max(noise, NEVER_BELOW)), LARGEST)
-    return mul(noise, shift(root_of(variance_in_integers(ratio, samples) << 17), 12)) << 3
+    sine = sine_cosine(radians_to_counts(lean, ANGLE_Q))[0]
+    ratio = min(quotient_q30(sine << 4, max(noise, NEVER_BELOW)), LARGEST)
+    return multiply_q31(noise, rounded_shift(root_of(variance_in_integers(ratio, samples) << 17), 12)) << 3

@@ -12,13 +12,13 @@ from typing import Any, Final
 
 from node.kernels.arithmetic.formats import Array
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.operations import fraction, length, times
-from node.kernels.arithmetic.quantity import factor
+from node.kernels.arithmetic.operations import bounded_ratio, times_factor, vector_length
+from node.kernels.arithmetic.quantity import factor_quantity
 from node.kernels.sensors.coarse_level import GRAVITY_ERROR
 
-LYING: Final = factor(0.5)  # part of gravity along the axis, below which a tube lies
+LYING: Final = factor_quantity(0.5)  # part of gravity along the axis, below which a tube lies
 FIRST: Final = 2  # cycles of a rest, in which it is turned: then the filter levels
-LEAST: Final = factor(2e-3)  # of a turn, rad: five sigmas of a force
+LEAST: Final = factor_quantity(2e-3)  # of a turn, rad: five sigmas of a force
 
 
 @kernel
@@ -27,15 +27,15 @@ def turn_down(node: Any) -> None:
     state, force = node.filter, node.force
     if not 0 < state.still_cycles <= FIRST or abs(state.now_down[2]) > LYING or node.guard.ramp.sense == 0:
         return
-    weight = length(force[0], force[1], force[2])
-    if abs(weight - node.config.gravity) > times(node.config.gravity, GRAVITY_ERROR):
+    weight = vector_length(force[0], force[1], force[2])
+    if abs(weight - node.config.gravity) > times_factor(node.config.gravity, GRAVITY_ERROR):
         return
-    felt, known = length(force[0], force[1], 0), length(state.now_down[0], state.now_down[1], 0)
-    if not (felt > times(weight, LYING) and known > 0):
+    felt, known = vector_length(force[0], force[1], 0), vector_length(state.now_down[0], state.now_down[1], 0)
+    if not (felt > times_factor(weight, LYING) and known > 0):
         return
-    fx, fy = -fraction(force[0], felt), -fraction(force[1], felt)
-    ux, uy = fraction(state.now_down[0], known), fraction(state.now_down[1], known)
-    c, s = times(ux, fx) + times(uy, fy), times(ux, fy) - times(uy, fx)
+    fx, fy = -bounded_ratio(force[0], felt), -bounded_ratio(force[1], felt)
+    ux, uy = bounded_ratio(state.now_down[0], known), bounded_ratio(state.now_down[1], known)
+    c, s = times_factor(ux, fx) + times_factor(uy, fy), times_factor(ux, fy) - times_factor(uy, fx)
     if c > 0 and abs(s) < LEAST:
         return
     turn_about_axis(state.down, c, s)
@@ -46,5 +46,5 @@ def turn_down(node: Any) -> None:
 def turn_about_axis(down: Array, c: float, s: float) -> None:
     """Turn a direction (3) about the axis by an angle of cosine ``c`` and sine ``s``."""
     x, y = down[0], down[1]
-    down[0] = times(x, c) - times(y, s)
-    down[1] = times(x, s) + times(y, c)
+    down[0] = times_factor(x, c) - times_factor(y, s)
+    down[1] = times_factor(x, s) + times_factor(y, c)

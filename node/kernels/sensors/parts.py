@@ -10,15 +10,23 @@ from typing import Any, Final
 
 from node.kernels.arithmetic.formats import Array
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.operations import half, is_number, number, over, share, speed, times
-from node.kernels.arithmetic.quantity import factor
+from node.kernels.arithmetic.operations import (
+    as_number,
+    half_of,
+    is_number,
+    over_factor,
+    proportional_share,
+    times_factor,
+    turning_rate,
+)
+from node.kernels.arithmetic.quantity import factor_quantity
 from node.kernels.filter.modes import STATIC_BIAS
 from node.kernels.record.filter_record import BEGAN_STILL, ENDED_STILL, KNOWN, PARTS, RECENT, RING
 from node.kernels.record.node_record import BEHIND, LATE, PART, SPLIT
 from node.kernels.record.ring import is_split
-from node.kernels.sensors.cluster import fuse, of_weighed, weighed
+from node.kernels.sensors.cluster import fuse_readings, of_weighed, weighted_share
 
-LEAST: Final = factor(0.5)  # of a turn about the tube's axis, that a gyroscope's z axis shows
+LEAST: Final = factor_quantity(0.5)  # of a turn about the tube's axis, that a gyroscope's z axis shows
 
 
 @kernel
@@ -43,24 +51,28 @@ def read_parts(node: Any, parameters: Array, reading: Array, imu: int, length: f
     if cluster.split[imu] == 0:
         return
     told, own = reading[PART:], cluster.parts[imu]
-    late, since, part = reading[LATE], memory.late, half(half(half(length)))
+    late, since, part = reading[LATE], memory.late, half_of(half_of(half_of(length)))
     since = since if is_number(since) else late
     rise = told[PARTS - 1] - told[PARTS - 2]
-    ahead = told[PARTS - 1] + share(half(rise), part, part - half(late))
+    ahead = told[PARTS - 1] + proportional_share(half_of(rise), part, part - half_of(late))
     if (ahead < 0) != (told[PARTS - 1] < 0):
         ahead = 0 * ahead
     total: float = 0
     for j in range(PARTS):
         own[j] = told[j]
-        total += half(half(half(told[j])))
+        total += half_of(half_of(half_of(told[j])))
     window = length - late + since
-    shown = share(total, length, window) - share(told[PARTS - 1], late, window) + share(reading[BEHIND], since, window)
+    shown = (
+        proportional_share(total, length, window)
+        - proportional_share(told[PARTS - 1], late, window)
+        + proportional_share(reading[BEHIND], since, window)
+    )
     turned = axis_reading(node, parameters, imu)
-    memory.behind, memory.ahead = over(reading[BEHIND] - shown, turned), over(ahead - shown, turned)
-    own[PARTS - 1] += share(ahead - told[PARTS - 1], late, part)
-    total += half(half(half(own[PARTS - 1] - told[PARTS - 1])))
+    memory.behind, memory.ahead = over_factor(reading[BEHIND] - shown, turned), over_factor(ahead - shown, turned)
+    own[PARTS - 1] += proportional_share(ahead - told[PARTS - 1], late, part)
+    total += half_of(half_of(half_of(own[PARTS - 1] - told[PARTS - 1])))
     for j in range(PARTS):
-        own[j] = over(own[j] - total, turned)
+        own[j] = over_factor(own[j] - total, turned)
 
 
 @kernel
@@ -90,13 +102,13 @@ def put_right(node: Any, imus: int) -> None:
         if imus == 1:
             shown = cluster.delayed[k].shown
         elif cluster.used[k] == 1:
-            shown += weighed(cluster.delayed[k].shown, cluster.weights[k], total)
+            shown += weighted_share(cluster.delayed[k].shown, cluster.weights[k], total)
     if imus > 1:
         shown = of_weighed(shown, total) if total > 0 else 0
     if shown == 0:
         return
     slot = newest % RING
-    faster = speed(shown, state.ring_end[slot] - state.ring_start[slot])
+    faster = turning_rate(shown, state.ring_end[slot] - state.ring_start[slot])
     state.ring_rate[slot, 2] += faster
     for j in range(PARTS):
         state.ring_parts[newest % RECENT, j] -= faster
@@ -111,14 +123,14 @@ def axis_reading(node: Any, parameters: Array, imu: int) -> float:
     if block.identity != 1:
         m = block.gyroscope.m
         x, y, z = (
-            times(x, m[0, 0]) + times(y, m[0, 1]) + times(z, m[0, 2]),
-            times(x, m[1, 0]) + times(y, m[1, 1]) + times(z, m[1, 2]),
-            times(x, m[2, 0]) + times(y, m[2, 1]) + times(z, m[2, 2]),
+            times_factor(x, m[0, 0]) + times_factor(y, m[0, 1]) + times_factor(z, m[0, 2]),
+            times_factor(x, m[1, 0]) + times_factor(y, m[1, 1]) + times_factor(z, m[1, 2]),
+            times_factor(x, m[2, 0]) + times_factor(y, m[2, 1]) + times_factor(z, m[2, 2]),
         )
     if own.identity != 1:
         m = own.gyroscope.m
-        z = times(x, m[2, 0]) + times(y, m[2, 1]) + times(z, m[2, 2])
-    return number(max(z, LEAST))
+        z = times_factor(x, m[2, 0]) + times_factor(y, m[2, 1]) + times_factor(z, m[2, 2])
+    return as_number(max(z, LEAST))
 
 
 @kernel
@@ -136,8 +148,8 @@ def split_cycle(node: Any, imus: int) -> None:
             own[j] = cluster.parts[0, j]
     else:
         return
-    began = BEGAN_STILL if is_at_rest(node, half(own[0] + own[1])) else 0
-    ended = ENDED_STILL if is_at_rest(node, half(own[PARTS - 2] + own[PARTS - 1])) else 0
+    began = BEGAN_STILL if is_at_rest(node, half_of(own[0] + own[1])) else 0
+    ended = ENDED_STILL if is_at_rest(node, half_of(own[PARTS - 2] + own[PARTS - 1])) else 0
     state.ring_split[slot] = KNOWN | began | ended
 
 
@@ -159,5 +171,5 @@ def fuse_parts(cluster: Any, imus: int, own: Array) -> bool:
         count += cluster.used[k]
     if count == 0:
         return False
-    fuse(cluster.parts[:], cluster.weights, own)
+    fuse_readings(cluster.parts[:], cluster.weights, own)
     return True

@@ -6,7 +6,7 @@ from typing import Any
 
 from node.kernels.arithmetic.formats import Array
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.operations import length, over, times
+from node.kernels.arithmetic.operations import over_factor, times_factor, vector_length
 from node.kernels.arithmetic.quantity import ONE
 from node.kernels.record.filter_record import RING
 from node.kernels.sensors.alignment import to_tube
@@ -23,7 +23,7 @@ def add_axes(node: Any, settings: Any, which: int) -> None:
 
 
 @kernel
-def realign(node: Any, settings: Any) -> None:
+def realign_filter(node: Any, settings: Any) -> None:
     """Turn what the filter holds in the tube's frame when the axes have changed since ``add_axes(.., 0)``.
 
     R = R_after R_before^T. The covariance stays: turning it by so little changes it in the second order.
@@ -39,7 +39,7 @@ def realign(node: Any, settings: Any) -> None:
         for j in range(3):
             rotation[i, j] = 0
             for k in range(3):
-                rotation[i, j] += times(aligner.rotations[1, i, k], aligner.rotations[0, j, k])
+                rotation[i, j] += times_factor(aligner.rotations[1, i, k], aligner.rotations[0, j, k])
     state.smoothing = 0  # the last survey is of the frame before
     turn_vector(rotation, state.down, work)
     turn_vector(rotation, state.now_down, work)
@@ -53,9 +53,9 @@ def realign(node: Any, settings: Any) -> None:
 @kernel
 def rotation_to_tube(axis: Array, work: Array, rotation: Array) -> None:
     """Matrix (3, 3) of ``to_tube`` into ``rotation``; ``axis`` (3) is made a unit vector, ``work`` is 3 numbers."""
-    size = length(axis[0], axis[1], axis[2])
+    size = vector_length(axis[0], axis[1], axis[2])
     for i in range(3):
-        axis[i] = over(axis[i], size)
+        axis[i] = over_factor(axis[i], size)
     for j in range(3):
         for i in range(3):
             work[i] = 0
@@ -69,6 +69,10 @@ def rotation_to_tube(axis: Array, work: Array, rotation: Array) -> None:
 def turn_vector(rotation: Array, vector: Array, work: Array) -> None:
     """Multiply ``vector`` (3) by ``rotation`` (3, 3), in place."""
     for i in range(3):
-        work[i] = times(vector[0], rotation[i, 0]) + times(vector[1], rotation[i, 1]) + times(vector[2], rotation[i, 2])
+        work[i] = (
+            times_factor(vector[0], rotation[i, 0])
+            + times_factor(vector[1], rotation[i, 1])
+            + times_factor(vector[2], rotation[i, 2])
+        )
     for i in range(3):
         vector[i] = work[i]

@@ -14,22 +14,22 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.arithmetic.formats import Array
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import are_numbers, number, times
-from node.kernels.arithmetic.quantity import factor
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import are_numbers, as_number, times_factor
+from node.kernels.arithmetic.quantity import factor_quantity
 from node.kernels.record.events import Fault
 
-NEAR_RANGE: Final = factor(0.999)  # of the range, from where a reading counts as saturated
+NEAR_RANGE: Final = factor_quantity(0.999)  # of the range, from where a reading counts as saturated
 FORCE_CYCLES: Final = 3  # in a row at the range: one knock is not a fault of the accelerometer
-BAD_SAMPLE = constant(Fault.BAD_SAMPLE)
-GYRO_SATURATED, GYRO_STUCK = constant(Fault.GYRO_SATURATED), constant(Fault.GYRO_STUCK)
-FORCE_SATURATED, FORCE_STUCK = constant(Fault.FORCE_SATURATED), constant(Fault.FORCE_STUCK)
+BAD_SAMPLE = kernel_constant(Fault.BAD_SAMPLE)
+GYRO_SATURATED, GYRO_STUCK = kernel_constant(Fault.GYRO_SATURATED), kernel_constant(Fault.GYRO_STUCK)
+FORCE_SATURATED, FORCE_STUCK = kernel_constant(Fault.FORCE_SATURATED), kernel_constant(Fault.FORCE_STUCK)
 
 
 @kernel
-def largest(vector: Array) -> float:
+def largest_magnitude(vector: Array) -> float:
     """Largest magnitude of three numbers."""
-    return number(max(abs(vector[0]), abs(vector[1]), abs(vector[2])))
+    return as_number(max(abs(vector[0]), abs(vector[1]), abs(vector[2])))
 
 
 @kernel
@@ -58,10 +58,10 @@ def find_faults(watch: Any, settings: Any, rate: Array, force: Array, saturated:
     together, alone = settings.repeats_together, settings.repeats_alone
     still_rate = is_stuck(watch.rates, rate, together, alone)
     still_force = is_stuck(watch.forces, force, together, alone)
-    clipped = saturated & 2 != 0 or largest(force) >= times(settings.force_range, NEAR_RANGE)
+    clipped = saturated & 2 != 0 or largest_magnitude(force) >= times_factor(settings.force_range, NEAR_RANGE)
     watch.clipped = watch.clipped + 1 if clipped else 0
     gyro = accelerometer = 0
-    if saturated & 1 != 0 or largest(rate) >= times(settings.rate_range, NEAR_RANGE):
+    if saturated & 1 != 0 or largest_magnitude(rate) >= times_factor(settings.rate_range, NEAR_RANGE):
         gyro = GYRO_SATURATED
     elif still_rate:
         gyro = GYRO_STUCK

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.arithmetic.formats import FORCE_PART, FORCE_Q, MEAN_Q, RATE_PART, STRONGEST, Array
-from node.kernels.arithmetic.integers import bits, mul, shift
+from node.kernels.arithmetic.integers import bit_length, multiply_q31, rounded_shift
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.operations import are_numbers, by_type, is_number, mean, number
+from node.kernels.arithmetic.operations import are_numbers, as_number, by_type, is_number, mean_of_total
 from node.kernels.sensors.correction import USUAL
 
 FARTHEST: Final = 1 << (MEAN_Q + 4)  # from the mean that counts: 16 rad/s, 16 g
@@ -16,12 +16,12 @@ MOST: Final = 1 << 59  # of a sum of products: 512 (rad/s)^2, 32768 g^2
 
 
 @by_type(lambda f: max(min(f, STRONGEST), -STRONGEST) << (MEAN_Q - FORCE_Q))
-def fine(f: float) -> float:
+def force_for_mean(f: float) -> float:
     """A force in the format of the means; integers are held at 32 g."""
     return f
 
 
-@by_type(lambda d, n: d - mean(d, n))
+@by_type(lambda d, n: d - mean_of_total(d, n))
 def without_one(d: float, n: int) -> float:
     """The part (n - 1)/n of a deviation."""
     return (n - 1.0) / n * d
@@ -29,18 +29,18 @@ def without_one(d: float, n: int) -> float:
 
 def _joint(a: int, b: int, q: int) -> int:
     one, other = max(min(a, FARTHEST), -FARTHEST), max(min(b, FARTHEST), -FARTHEST)
-    spare = max(bits(abs(other)) - 31, 0)
-    return shift(mul(one, other >> spare), 2 * MEAN_Q - 31 - spare - q)
+    spare = max(bit_length(abs(other)) - 31, 0)
+    return rounded_shift(multiply_q31(one, other >> spare), 2 * MEAN_Q - 31 - spare - q)
 
 
 @by_type(_joint)
-def joint(a: float, b: float, q: int) -> float:
+def deviation_product(a: float, b: float, q: int) -> float:
     """Product of two deviations; integers: in Q``q``, each held at 16 rad/s or 16 g."""
     return a * b
 
 
 @by_type(lambda total, a: max(min(total + a, MOST), -MOST))
-def added(total: float, a: float) -> float:
+def bounded_sum(total: float, a: float) -> float:
     """A sum and one product more; integers are held."""
     return total + a
 
@@ -66,20 +66,20 @@ def add_static(record: Any, rate: Array, force: Array, temperature: float, stand
     n = record.samples
     if standing == 0:
         record.moved = 1
-    record.temperature += mean(temperature - record.temperature, n)
+    record.temperature += mean_of_total(temperature - record.temperature, n)
     for i in range(6):
-        x = rate[i] if i < 3 else fine(force[i - 3])
+        x = rate[i] if i < 3 else force_for_mean(force[i - 3])
         if n > 1:
             step = x - record.last[i]
-            record.steps[i] = added(record.steps[i], joint(step, step, 2 * part_of(i)))
+            record.steps[i] = bounded_sum(record.steps[i], deviation_product(step, step, 2 * part_of(i)))
         record.last[i] = x
         record.delta[i] = x - record.mean[i]
-        record.mean[i] += mean(record.delta[i], n)
+        record.mean[i] += mean_of_total(record.delta[i], n)
     for i in range(6):
         rest = without_one(record.delta[i], n)
         for j in range(6):
-            product = joint(rest, record.delta[j], part_of(i) + part_of(j))
-            record.scatter[i, j] = added(record.scatter[i, j], product)
+            product = deviation_product(rest, record.delta[j], part_of(i) + part_of(j))
+            record.scatter[i, j] = bounded_sum(record.scatter[i, j], product)
     return 1
 
 
@@ -111,7 +111,7 @@ def follow_recording(node: Any, start: float, end: float, standing: int) -> bool
         return False
     if not is_number(recording.begun):
         recording.begun = start
-    temperature = number(node.temperature) if is_number(node.temperature) else USUAL
+    temperature = as_number(node.temperature) if is_number(node.temperature) else USUAL
     add_static(recording.sums, node.raw_rate, node.raw_force, temperature, standing)
     has_ended = recording.sums.moved == 1 and recording.sums.samples >= FEWEST
     if end - recording.begun < recording.seconds and not has_ended:

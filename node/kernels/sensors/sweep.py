@@ -11,24 +11,24 @@ from typing import Any, Final
 
 from node.kernels.arithmetic.circular import spin_of
 from node.kernels.arithmetic.formats import ANGLE_Q, PRODUCT_Q, SQUARE_Q, VECTOR_Q, Array
-from node.kernels.arithmetic.integers import shift
+from node.kernels.arithmetic.integers import rounded_shift
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.operations import by_type, fraction, length, times
+from node.kernels.arithmetic.operations import bounded_ratio, by_type, times_factor, vector_length
 
 FREEDOMS: Final = 6  # of the circle: middle, radius and phase, and their drift
 LEAST_WEIGHT: Final = 0.2  # of that of as many samples without a turn: half a turn has less
 MOST_SAMPLES: Final = 1 << 13  # the sums of the integers hold as many, of 20 turns
 
 
-@by_type(lambda a, b: shift(a * b, 2 * VECTOR_Q - PRODUCT_Q))
+@by_type(lambda a, b: rounded_shift(a * b, 2 * VECTOR_Q - PRODUCT_Q))
 def fine_product(a: float, b: float) -> float:
     """Product of two numbers up to 1; integers in Q46, so that what noise leaves of a sum of them is not lost."""
     return a * b
 
 
 def _angle_square(angle: int) -> int:
-    part = shift(angle, ANGLE_Q - 24)
-    return shift(part * part, 48 - SQUARE_Q)
+    part = rounded_shift(angle, ANGLE_Q - 24)
+    return rounded_shift(part * part, 48 - SQUARE_Q)
 
 
 @by_type(_angle_square)
@@ -59,7 +59,7 @@ def add_to_sweep(sweep: Any, force: Array, angle: float) -> None:
     With u = -f / |f|: sums of u, u u^T, and of the products of 1 and u with exp(i angle) and angle exp(i angle).
     """
     u = sweep.u
-    size = length(force[0], force[1], force[2])
+    size = vector_length(force[0], force[1], force[2])
     spin = spin_of(angle)
     first = sweep.samples == 0
     sweep.samples += 1
@@ -67,13 +67,13 @@ def add_to_sweep(sweep: Any, force: Array, angle: float) -> None:
     sweep.sum_angle_squares += angle_square(angle)
     for k in range(2):
         sweep.sum_spin[k] += spin[k]
-        sweep.sum_angle_spin[k] += times(angle, spin[k])
+        sweep.sum_angle_spin[k] += times_factor(angle, spin[k])
     for i in range(3):
-        u[i] = fraction(-force[i], size)
+        u[i] = bounded_ratio(-force[i], size)
         sweep.sum[i] += u[i]
         for k in range(2):
             sweep.sum_back[i, k] += fine_product(u[i], spin[k])
-            sweep.sum_angle_back[i, k] += times(times(angle, u[i]), spin[k])
+            sweep.sum_angle_back[i, k] += times_factor(times_factor(angle, u[i]), spin[k])
     for i in range(3):
         for j in range(3):
             sweep.sum_products[i, j] += fine_product(u[i], u[j])

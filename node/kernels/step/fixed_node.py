@@ -9,8 +9,8 @@ import numpy as np
 from node.kernels.arithmetic.formats import Array
 from node.kernels.record.integer_node import new_integers
 from node.kernels.step.fixed_step import fixed_aiding, fixed_step
+from node.kernels.step.precompile import warm_loop, warm_step
 from node.kernels.step.shadow_record import fixed_cycle, fixed_offer
-from node.kernels.step.warm import warm_loop, warm_step
 
 
 class FixedNode:

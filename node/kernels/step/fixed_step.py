@@ -7,7 +7,7 @@ it, and shown: reports and the saved state are taken from it.
 from __future__ import annotations
 
 from node.kernels.arithmetic.formats import Array
-from node.kernels.arithmetic.jit import entry, kernel
+from node.kernels.arithmetic.jit import entry_kernel, kernel
 from node.kernels.filter.fixed.cycle import run_cycle
 from node.kernels.step.node_step import aiding_around, step_around
 from node.kernels.step.shadow_words import learn_aiding, learn_inputs, learn_node, show_node
@@ -26,7 +26,7 @@ def integer_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
     return int(aiding_around(offer_aiding, nodes, settings, aiding))
 
 
-@entry
+@entry_kernel
 def fixed_step(
     nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array, integers: Array
 ) -> int:
@@ -45,7 +45,7 @@ def fixed_step(
     return says
 
 
-@entry
+@entry_kernel
 def fixed_aiding(nodes: Array, settings: Array, aiding: Array, integers: Array) -> int:
     """Take one aiding into a node as ``node.kernels.step.node_step.node_aiding``; ``integers`` as ``fixed_step``."""
     learn_node(nodes, settings, integers)

@@ -10,29 +10,36 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.arithmetic.formats import ANGLE_Q, DEG, VECTOR_Q, Array
-from node.kernels.arithmetic.jit import constant, entry, kernel, shared_body
+from node.kernels.arithmetic.jit import entry_kernel, kernel, kernel_constant, shared_body
 from node.kernels.arithmetic.operations import (
     angle_of,
-    drifted,
-    half,
-    held,
+    angular_root,
+    bounded_variance,
+    clock_drift_offset,
+    half_of,
     is_number,
-    lasting,
-    ratio,
-    root,
+    quantity_ratio,
     stamp_square,
+    time_of_cycles,
     time_root,
 )
-from node.kernels.arithmetic.quantity import LONG_AGO, NONE, factor, rate, rate_variance, seconds
+from node.kernels.arithmetic.quantity import (
+    LONG_AGO,
+    NONE,
+    factor_quantity,
+    rate_quantity,
+    rate_variance_quantity,
+    time_quantity,
+)
 from node.kernels.filter.float64.cycle import run_cycle
 from node.kernels.filter.modes import STATIC_BIAS
 from node.kernels.filter.priors import set_stamp
 from node.kernels.filter.resets import doubt_stamp, forget_dates, move_dates, set_stamp_prior, start_over
 from node.kernels.filter.revision import follow_revision, open_revision
-from node.kernels.record.events import Code, tell, told, told_degrees
-from node.kernels.record.filter_record import CLOCK_SLACK, Err, Scheme, Status
+from node.kernels.record.events import Code, event_degrees, event_number, queue_event
+from node.kernels.record.filter_record import CLOCK_SLACK, CycleStatus, Err, Scheme
 from node.kernels.record.node_record import (
     A_HOPS,
     A_OFFSET,
@@ -55,50 +62,54 @@ from node.kernels.record.node_record import (
 from node.kernels.sensors.aligner import follow_alignment
 from node.kernels.sensors.cluster import learn_offsets, survey_imus
 from node.kernels.sensors.coarse_level import level_coarsely
-from node.kernels.sensors.intake import take_readings
 from node.kernels.sensors.lying import turn_down
 from node.kernels.sensors.parts import put_right
-from node.kernels.sensors.sensor_watch import largest
+from node.kernels.sensors.reading_intake import take_readings
+from node.kernels.sensors.sensor_watch import largest_magnitude
 from node.kernels.sensors.static_average import follow_recording
 from node.kernels.string.make_up import follow_joints
 from node.kernels.string.relay import offer_aiding
 from node.kernels.string.twist import gate_twist, holds_survey, reaching_var, twist_var
-from node.kernels.turns.doubts import noise_var, passing_var, unexplained_var
-from node.kernels.turns.gates import admits, gate_aiding
+from node.kernels.turns.gates import admits_cycle, gate_aiding
 from node.kernels.turns.guard import guard_reading, judge_cycle
 from node.kernels.turns.ramps import follow_ramp
 from node.kernels.turns.rest_watch import watch_rest
 from node.kernels.turns.swings import follow_swing
+from node.kernels.turns.yaw_doubts import noise_var, passing_var, unexplained_var
 
 STILL_CYCLES: Final = 4  # after which a node takes itself for standing
-LARGEST_OFFSET: Final = rate(6.0 * DEG)  # rad/s, of a gyroscope never calibrated; the slow alignment turn is faster
-LEAST_STAMP: Final = seconds(1e-4)  # s, of a time stamp, whatever the clock says
-MOST_STAMP: Final = seconds(CLOCK_SLACK)
-NEAR, FAR = factor(0.8), factor(1.25)  # of a time stamp's prior that is left alone
-LARGE_MOVE_VAR: Final = rate_variance(3e-3 * 3e-3)  # s^2, of a clock, beyond what the wander of the time stamp covers
+LARGEST_OFFSET: Final = rate_quantity(
+    6.0 * DEG
+)  # rad/s, of a gyroscope never calibrated; the slow alignment turn is faster
+LEAST_STAMP: Final = time_quantity(1e-4)  # s, of a time stamp, whatever the clock says
+MOST_STAMP: Final = time_quantity(CLOCK_SLACK)
+NEAR, FAR = factor_quantity(0.8), factor_quantity(1.25)  # of a time stamp's prior that is left alone
+LARGE_MOVE_VAR: Final = rate_variance_quantity(
+    3e-3 * 3e-3
+)  # s^2, of a clock, beyond what the wander of the time stamp covers
 SAY_EVENTS, SAY_SURVEY, SAY_ESTIMATE, SAY_STATE, SAY_RECORD, ADMITTED, SAY_REVISION = 1, 2, 4, 8, 16, 32, 64
 REFUSED: Final = -1  # the times of a cycle are such that it cannot be run
 USED, ONWARD = 1, 2  # of an aiding: it is for the filter, and it goes down
-FORWARD, FILTER_FAULT = int(Scheme.FORWARD), int(Status.FILTER_FAULT)
-AIDED, SURVEY_READY, STOPPED = int(Status.AIDED), int(Status.SURVEY_READY), int(Status.STOPPED)
+FORWARD, FILTER_FAULT = int(Scheme.FORWARD), int(CycleStatus.FILTER_FAULT)
+AIDED, SURVEY_READY, STOPPED = int(CycleStatus.AIDED), int(CycleStatus.SURVEY_READY), int(CycleStatus.STOPPED)
 TOLD_FIRST, TOLD_LAST = 16, 26  # codes of ``STATUS_TOLD``
 STATUS_TOLD: Final = (
-    int(Status.STOPPED),
-    int(Status.STARTED),
-    int(Status.JOINT_OPENED),
-    int(Status.JOINT_CLOSED),
-    int(Status.BIAS_KNOWN),
-    int(Status.REFERENCE_CHANGED),
-    int(Status.YAW_RESET),
-    int(Status.RATE_EXCEEDED),
-    int(Status.RATE_RECOVERED),
-    int(Status.BAD_SAMPLE),
+    int(CycleStatus.STOPPED),
+    int(CycleStatus.STARTED),
+    int(CycleStatus.JOINT_OPENED),
+    int(CycleStatus.JOINT_CLOSED),
+    int(CycleStatus.BIAS_KNOWN),
+    int(CycleStatus.REFERENCE_CHANGED),
+    int(CycleStatus.YAW_RESET),
+    int(CycleStatus.RATE_EXCEEDED),
+    int(CycleStatus.RATE_RECOVERED),
+    int(CycleStatus.BAD_SAMPLE),
     FILTER_FAULT,
 )
-AIDING_REJECTED, D = constant(Code.AIDING_REJECTED), constant(Err.STAMP)
+AIDING_REJECTED, D = kernel_constant(Code.AIDING_REJECTED), kernel_constant(Err.STAMP)
 
 
-@entry
+@entry_kernel
 def node_step(nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
     """One cycle of one node with the float64 loop; returns what there is to say.
 
@@ -123,36 +134,43 @@ def step_around(
 ) -> int:
     """One cycle of one node around the loop ``run_cycle`` over its float64 record; see ``node_step``."""
     node = nodes[0]
-    waits = enter(nodes, settings, parameters, readings, moment)
+    waits = begin_step(nodes, settings, parameters, readings, moment)
     if waits == REFUSED:
         return say_events(node)
     joined = 1 if moment[JOINED] != 0 else 0
     status = run_cycle(node.filter, node.config, node.rate, node.force, moment[START], moment[END], joined)
-    return int(leave(nodes, settings, moment, status, waits))
+    return int(end_step(nodes, settings, moment, status, waits))
 
 
 @kernel
-def enter(nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
-    """What comes before the loop: its ``rate`` and ``force`` are left in the record; see ``node_step``.
+def begin_step(nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
+    """What comes before the loop: its ``rate_quantity`` and ``force`` are left in the record; see ``node_step``.
 
-    Returns ``REFUSED``, and the step ends here, or what ``leave`` is to be told: whether the survey waits.
+    Returns ``REFUSED``, and the step ends here, or what ``end_step`` is to be told: whether the survey waits.
     """
-    node, crew = nodes[0], settings[0]
-    if not admits(node, moment[START], moment[END]):
+    node, node_settings = nodes[0], settings[0]
+    if not admits_cycle(node, moment[START], moment[END]):
         return REFUSED
-    saturated = take_readings(node, crew, parameters, readings, moment[END] - moment[START])
-    return before_loop(node, crew, moment, saturated)
+    saturated = take_readings(node, node_settings, parameters, readings, moment[END] - moment[START])
+    return before_loop(node, node_settings, moment, saturated)
 
 
 @kernel
-def leave(nodes: Array, settings: Array, moment: Array, status: int, waits: int) -> int:
-    """What comes after a loop that returned ``status``; ``waits`` is the answer of ``enter``."""
-    node, crew = nodes[0], settings[0]
-    after_loop(node, crew, moment, status, waits)
-    follow_alignment(node, crew, moment[START], moment[END])
-    if crew.imus > 1 and is_quiet(node):
-        learn_offsets(node, crew)
-    return conclude(node, crew, moment)
+def end_step(nodes: Array, settings: Array, moment: Array, status: int, waits: int) -> int:
+    """What comes after a loop that returned ``status``; ``waits`` is the answer of ``begin_step``."""
+    node = nodes[0]
+    after_loop(node, moment, status, waits)
+    return conclude_cycle(nodes, settings, moment)
+
+
+@kernel
+def conclude_cycle(nodes: Array, settings: Array, moment: Array) -> int:
+    """What comes after the cycle was judged: alignment, offsets of the IMUs, and what there is to say."""
+    node, node_settings = nodes[0], settings[0]
+    follow_alignment(node, node_settings, moment[START], moment[END])
+    if node_settings.imus > 1 and is_quiet(node):
+        learn_offsets(node, node_settings)
+    return report_cycle(node, node_settings, moment)
 
 
 @kernel
@@ -166,8 +184,8 @@ def before_loop(node: Any, settings: Any, moment: Array, saturated: int) -> int:
     watch_rest(node, settings, end)
     follow_clock(node, settings, moment)
     level_coarsely(state, node.config, node.rate, node.force)
-    node.slow_cycles = node.slow_cycles + 1 if largest(node.rate) < LARGEST_OFFSET else 0
-    if node.cycles > 0 and start - state.now > half(end - start):
+    node.slow_cycles = node.slow_cycles + 1 if largest_magnitude(node.rate) < LARGEST_OFFSET else 0
+    if node.cycles > 0 and start - state.now > half_of(end - start):
         node.overruns += 1
     waits = 1 if state.surveyed == 0 and holds_survey(node, settings, end) else 0
     if waits == 1:
@@ -176,8 +194,17 @@ def before_loop(node: Any, settings: Any, moment: Array, saturated: int) -> int:
 
 
 @kernel
-def after_loop(node: Any, settings: Any, moment: Array, status: int, waits: int) -> None:
-    """Take what the loop made of the cycle."""
+def after_loop(node: Any, moment: Array, status: int, waits: int) -> None:
+    """Take what the loop made of the cycle, and judge it."""
+    take_status(node, status, waits)
+    follow_swing(node)
+    follow_ramp(node)
+    judge_cycle(node, node.status, moment[END])
+
+
+@kernel
+def take_status(node: Any, status: int, waits: int) -> None:
+    """Take what the loop says of the cycle; see ``end_step``."""
     if waits == 1:
         node.filter.surveyed = 0
     node.status = status | node.noticed
@@ -187,21 +214,17 @@ def after_loop(node: Any, settings: Any, moment: Array, status: int, waits: int)
     node.cycles += 1
     if node.status & FILTER_FAULT:
         start_over(node.filter, node.config)
-    follow_swing(node)
-    if settings.as_published == 0:
-        follow_ramp(node)
-    judge_cycle(node, node.status, moment[END])
 
 
 @kernel
-def conclude(node: Any, settings: Any, moment: Array) -> int:
+def report_cycle(node: Any, settings: Any, moment: Array) -> int:
     """Tell what the cycle found, as events, and record it; returns what there is to say."""
     state, status = node.filter, node.status
     if status & ~AIDED:
         tell_status(node)
     if state.rejected > 0 and node.rejecting == 0:
-        sigmas = ratio(abs(state.innovation), root(state.innovation_var))
-        tell(node, AIDING_REJECTED, told(sigmas, VECTOR_Q), NONE, NONE, NONE)
+        sigmas = quantity_ratio(abs(state.innovation), angular_root(state.innovation_var))
+        queue_event(node, AIDING_REJECTED, event_number(sigmas, VECTOR_Q), NONE, NONE, NONE)
     node.rejecting = 1 if state.rejected > 0 else 0
     says = say_events(node) | ADMITTED
     if follow_recording(node, moment[START], moment[END], 1 if is_standing(node) else 0):
@@ -236,10 +259,10 @@ def is_standing(node: Any) -> bool:
 def tell_status(node: Any) -> None:
     """An event for every status bit that has one."""
     state = node.filter
-    yaw_deg = told_degrees(angle_of(state.now_rate, state.now_yaw), ANGLE_Q)
+    yaw_deg = event_degrees(angle_of(state.now_rate, state.now_yaw), ANGLE_Q)
     for k in range(TOLD_LAST - TOLD_FIRST + 1):
         if node.status & STATUS_TOLD[k]:
-            tell(node, TOLD_FIRST + k, yaw_deg, NONE, NONE, NONE)
+            queue_event(node, TOLD_FIRST + k, yaw_deg, NONE, NONE, NONE)
 
 
 @kernel
@@ -270,7 +293,7 @@ def follow_clock(node: Any, settings: Any, moment: Array) -> None:
         move_dates(state, stepped)
         is_void = state.P[D, D] > var
     hops = max(int(moment[HOPS]), 1)
-    is_other = hops != node.stamp_hops or not NEAR < ratio(std, config.stamp_std) < FAR
+    is_other = hops != node.stamp_hops or not NEAR < quantity_ratio(std, config.stamp_std) < FAR
     grown = var - stamp_square(config.stamp_std)
     if is_other:
         node.stamp_hops = hops
@@ -287,11 +310,13 @@ def wander_var(state: Any, end: float, drift: float) -> float:
 
     The aidings of a string that turns show the stamp; since the last of them it wanders in proportion to the time.
     """
-    unseen = max(lasting(end, state.still_cycles + 1), end - state.last_aided)
-    return stamp_square(drifted(drift, unseen)) - stamp_square(drifted(drift, unseen - lasting(end, 1)))
+    unseen = max(time_of_cycles(end, state.still_cycles + 1), end - state.last_aided)
+    return stamp_square(clock_drift_offset(drift, unseen)) - stamp_square(
+        clock_drift_offset(drift, unseen - time_of_cycles(end, 1))
+    )
 
 
-@entry
+@entry_kernel
 def node_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
     """Take one aiding into a node with the float64 loop; returns whether it was used and whether it goes down.
 
@@ -331,25 +356,25 @@ def aiding_around(offer_aiding: Callable[..., int], nodes: Array, settings: Arra
 @kernel
 def take_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
     """Gate an aiding, and leave this node's offset and systematic variance in its record; ``USED`` and ``ONWARD``."""
-    node, crew = nodes[0], settings[0]
+    node, node_settings = nodes[0], settings[0]
     from_drive = aiding[A_HOPS] == 0
-    node.down_offset = wrap(aiding[A_OFFSET] + (crew.drive_angle if from_drive else 0))
-    node.down_systematic = held(aiding[A_SYSTEMATIC] + (crew.drive_var if from_drive else 0))
-    node.down_torsion = reaching_var(aiding[A_TORSION], aiding[A_TORQUE], crew.stiffness)
-    follow_joints(node, crew, aiding)
-    used = gate_aiding(node, aiding) and gate_twist(node, crew, aiding)
-    return (USED if used else 0) | (ONWARD if crew.scheme == FORWARD else 0)
+    node.down_offset = wrap_angle(aiding[A_OFFSET] + (node_settings.drive_angle if from_drive else 0))
+    node.down_systematic = bounded_variance(aiding[A_SYSTEMATIC] + (node_settings.drive_var if from_drive else 0))
+    node.down_torsion = reaching_var(aiding[A_TORSION], aiding[A_TORQUE], node_settings.stiffness)
+    follow_joints(node, node_settings, aiding)
+    used = gate_aiding(node, aiding) and gate_twist(node, node_settings, aiding)
+    return (USED if used else 0) | (ONWARD if node_settings.scheme == FORWARD else 0)
 
 
 @kernel
 def own_systematic(node: Any) -> float:
     """Systematic variance (rad^2) of the aiding taken last, with this node's twist and what it cannot explain."""
-    return held(node.down_systematic + twist_var(node.twist) + unexplained_var(node))
+    return bounded_variance(node.down_systematic + twist_var(node.twist) + unexplained_var(node))
 
 
 @kernel
 def hand_down(nodes: Array, settings: Array) -> None:
     """Add the joint below to what the record hands down."""
-    node, crew = nodes[0], settings[0]
-    node.down_offset = wrap(node.down_offset + crew.lower_angle)
-    node.down_systematic = held(node.down_systematic + crew.lower_var)
+    node, node_settings = nodes[0], settings[0]
+    node.down_offset = wrap_angle(node.down_offset + node_settings.lower_angle)
+    node.down_systematic = bounded_variance(node.down_systematic + node_settings.lower_var)

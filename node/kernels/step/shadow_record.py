@@ -24,12 +24,12 @@ from node.kernels.record.filter_conversion import (
     take_reading,
     to_fixed,
 )
-from node.kernels.record.filter_record import Status
-from node.kernels.record.word_conversion import differ, keep
+from node.kernels.record.filter_record import CycleStatus
+from node.kernels.record.word_conversion import copy_words, words_differ
 from node.kernels.string.relay import offer_aiding
 
-BAD_SAMPLE, SURVEY_READY = int(Status.BAD_SAMPLE), int(Status.SURVEY_READY)
-REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
+BAD_SAMPLE, SURVEY_READY = int(CycleStatus.BAD_SAMPLE), int(CycleStatus.SURVEY_READY)
+REFERENCE_CHANGED = int(CycleStatus.REFERENCE_CHANGED)
 
 
 @kernel
@@ -57,7 +57,7 @@ def fixed_cycle(
     for k in range(3):
         if not (math.isfinite(rate[k]) and math.isfinite(force[k])):
             return BAD_SAMPLE
-    learn(own, state, config, state_words, config_words)
+    learn_changes(own, state, config, state_words, config_words)
     fixed = own.node.filter
     take_reading(fixed, rate, force, own.gravity, own.rate, own.force)
     begin, until = to_fixed(fixed, start, TIME_Q, LARGEST), to_fixed(fixed, end, TIME_Q, LARGEST)
@@ -67,7 +67,7 @@ def fixed_cycle(
     show_aiding(fixed, state)
     if status & SURVEY_READY:
         show_survey(fixed, state, own.gravity)
-    keep(own.shown, state_words)
+    copy_words(own.shown, state_words)
     return status
 
 
@@ -87,7 +87,7 @@ def fixed_offer(
     hops: int,
 ) -> int:
     """Queue one aiding as ``node.kernels.string.relay.offer_aiding``, in the integers; records as ``fixed_cycle``."""
-    learn(own, state, config, state_words, config_words)
+    learn_changes(own, state, config, state_words, config_words)
     fixed = own.node.filter
     status = offer_aiding(
         fixed,
@@ -103,18 +103,18 @@ def fixed_offer(
     show_aiding(fixed, state)
     if status & REFERENCE_CHANGED:
         show_covariance(fixed, state)
-    keep(own.shown, state_words)
+    copy_words(own.shown, state_words)
     return status
 
 
 @kernel
-def learn(own: Any, state: Any, config: Any, state_words: Array, config_words: Array) -> None:
+def learn_changes(own: Any, state: Any, config: Any, state_words: Array, config_words: Array) -> None:
     """Read configuration and state when they are not what was read or shown last."""
-    if own.met == 0 or differ(own.read, config_words):
-        keep(own.read, config_words)
+    if own.met == 0 or words_differ(own.read, config_words):
+        copy_words(own.read, config_words)
         own.gravity = config.gravity
         learn_config(own.node.config, config, own.node.filter)
         own.shown_changes = 0
-    if own.met == 0 or differ(own.shown, state_words):
+    if own.met == 0 or words_differ(own.shown, state_words):
         learn_state(own.node.filter, state, own.gravity)
     own.met = 1

@@ -43,15 +43,15 @@ from node.kernels.record.integer_node import (
     SETTINGS_WORDS,
     STATE_WORDS,
 )
-from node.kernels.record.word_conversion import differ, keep, learn_numbers, learn_words, show_words
-from node.kernels.step.shadow_record import learn
+from node.kernels.record.word_conversion import copy_words, learn_numbers, learn_words, show_words, words_differ
+from node.kernels.step.shadow_record import learn_changes
 
 ALIGNER: Final = (ALIGNER_AT - AROUND_AT, RECORDING_AT - AROUND_AT)  # words of what is ordered; the first says
 RECORDING: Final = (RECORDING_AT - AROUND_AT, END_AT - AROUND_AT)  # whether it is under way
 
 
 @kernel
-def compared(imus: int) -> int:
+def compared_word_count(imus: int) -> int:
     """How many of the words around the filter are compared and shown at every call."""
     return (ALIGNER_AT if imus > 1 else RING_AT) - AROUND_AT
 
@@ -61,27 +61,27 @@ def learn_node(nodes: Array, settings: Array, integers: Array) -> None:
     """Read settings, configuration, filter and what stands around it where they are not what was shown last."""
     own, words, inside = integers[0], nodes.view(np.int64), integers.view(np.int64)
     met = own.met
-    learn(
+    learn_changes(
         own,
         nodes[0].filter,
         nodes[0].config,
         words[FILTER_AT : FILTER_AT + STATE_WORDS],
         words[CONFIG_AT : CONFIG_AT + CONFIG_WORDS],
     )
-    crew = settings.view(np.int64)
-    if met == 0 or differ(own.read_settings, crew):
-        keep(own.read_settings, crew)
+    given = settings.view(np.int64)
+    if met == 0 or words_differ(own.read_settings, given):
+        copy_words(own.read_settings, given)
         made = inside[SETTINGS_INSIDE : SETTINGS_INSIDE + SETTINGS_WORDS]
         floats = settings.view(np.float64)
-        learn_words(own.node.filter, made, crew, floats, SETTINGS_SCALES, SETTINGS_POWERS, own.gravity)
+        learn_words(own.node.filter, made, given, floats, SETTINGS_SCALES, SETTINGS_POWERS, own.gravity)
     last = (END_AT if met == 0 else ALIGNER_AT if settings[0].imus > 1 else CLUSTER_AT) - AROUND_AT
     around, floats = words[AROUND_AT:END_AT], nodes.view(np.float64)[AROUND_AT:END_AT]
     made = inside[INSIDE : INSIDE + END_AT - AROUND_AT]
-    if met == 0 or differ(own.shown_around, around[: compared(settings[0].imus)]):
+    if met == 0 or words_differ(own.shown_around, around[: compared_word_count(settings[0].imus)]):
         learn_part(own, made, around, floats, 0, last)
     for begin, end in (ALIGNER, RECORDING):
         part = around[begin:end]
-        if (part[0] | made[begin]) != 0 and differ(own.shown_around[begin:end], part):
+        if (part[0] | made[begin]) != 0 and words_differ(own.shown_around[begin:end], part):
             learn_part(own, made, around, floats, begin, end)
 
 
@@ -91,8 +91,8 @@ def learn_part(own: Any, made: Array, around: Array, floats: Array, begin: int, 
     part = slice(begin, end)
     scales, powers = AROUND_SCALES[part], AROUND_POWERS[part]
     learn_words(own.node.filter, made[part], around[part], floats[part], scales, powers, own.gravity)
-    keep(own.last[part], made[part])
-    keep(own.shown_around[part], around[part])
+    copy_words(own.last[part], made[part])
+    copy_words(own.shown_around[part], around[part])
 
 
 @kernel
@@ -100,8 +100,8 @@ def learn_inputs(parameters: Array, readings: Array, moment: Array, integers: Ar
     """Read what one cycle brings, and the corrections where they are other ones."""
     own, words = integers[0], parameters.view(np.int64)
     counter, gravity = own.node.filter, own.gravity
-    if differ(own.read_parameters, words):
-        keep(own.read_parameters, words)
+    if words_differ(own.read_parameters, words):
+        copy_words(own.read_parameters, words)
         made = integers.view(np.int64)[PARAMETERS_INSIDE : PARAMETERS_INSIDE + words.shape[0]]
         floats = parameters.view(np.float64)
         learn_words(counter, made, words, floats, PARAMETER_SCALES, PARAMETER_POWERS, gravity)
@@ -131,20 +131,20 @@ def show_node(nodes: Array, settings: Array, integers: Array, cycle: bool) -> No
         show_ring(fixed, state, gravity)
     show_covariance(fixed, state)
     show_aiding(fixed, state)
-    keep(own.shown, words[FILTER_AT : FILTER_AT + STATE_WORDS])
+    copy_words(own.shown, words[FILTER_AT : FILTER_AT + STATE_WORDS])
     if own.node.config.changes != own.shown_changes:
         show_config(own.node.config, nodes[0].config, gravity)
         own.shown_changes = own.node.config.changes
-        keep(own.read, words[CONFIG_AT : CONFIG_AT + CONFIG_WORDS])
-    told, count = nodes[0].events.told, compared(settings[0].imus)
+        copy_words(own.read, words[CONFIG_AT : CONFIG_AT + CONFIG_WORDS])
+    told, count = nodes[0].events.told, compared_word_count(settings[0].imus)
     show_part(own, inside, around, floats, gravity, 0, count)
     for begin, end in (ALIGNER, RECORDING):
         if (around[begin] | inside[begin]) != 0:
             show_part(own, inside, around, floats, gravity, begin, end)
-            keep(own.shown_around[begin:end], around[begin:end])
+            copy_words(own.shown_around[begin:end], around[begin:end])
     if told != nodes[0].events.told:
         show_part(own, inside, around, floats, gravity, RING_AT - AROUND_AT, CLUSTER_AT - AROUND_AT)
-    keep(own.shown_around, around[:count])
+    copy_words(own.shown_around, around[:count])
 
 
 @kernel

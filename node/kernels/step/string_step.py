@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba.core import types
+from numba import types
 
 from node.kernels.arithmetic.formats import Array
 from node.kernels.arithmetic.jit import kernel
@@ -62,7 +62,8 @@ def string_step(
 
     Parameters
     ----------
-    step : ``node_step`` of ``node.kernels.step.address.firmware``; with ``integers`` that of the kernel ``fixed``
+    step : ``node_step`` of ``node.kernels.step.address.firmware_addresses``; with ``integers`` that of the kernel
+    ``fixed``
     nodes, settings : (n,) of dtype ``NODE`` and ``SETTINGS``
     parameters, readings, moments : (n, ...) as ``node_step`` takes them
     integers : (n,) of dtype ``INTEGERS``; None of nodes in floats, for which the loop is compiled without it
@@ -90,7 +91,8 @@ def string_aiding(
 
     Parameters
     ----------
-    aid : ``node_aiding`` of ``node.kernels.step.address.firmware``; with ``integers`` that of the kernel ``fixed``
+    aid : ``node_aiding`` of ``node.kernels.step.address.firmware_addresses``; with ``integers`` that of the kernel
+    ``fixed``
     nodes, settings : (n,) of dtype ``NODE`` and ``SETTINGS``
     string : (hops or more,) indices of the nodes, from the top down
     valid_locals : (hops or more,) time of validity by the clock of each node, s

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.quantity import seconds
+from node.kernels.arithmetic.quantity import time_quantity
 
-RATE_AGE: Final = seconds(3.0)  # s, of an encoder's rate that may stand for the gyroscope
+RATE_AGE: Final = time_quantity(3.0)  # s, of an encoder's rate that may stand for the gyroscope
 
 
 @kernel

@@ -96,7 +96,7 @@ def measure_turning(encoder: Any, sample: Array, aiding: Array) -> None:
     rate = (encoder.edge_angle - before_angle) / (encoder.edge_at - before_at)
     timed = sample[TIMED] != 0.0
     angle = encoder.edge_angle if timed else (sample[COUNT] + 0.5) * QUANTUM
-    leave(encoder, aiding, angle, EDGE_VAR if timed else COUNT_VAR, encoder.edge_at)
+    write_rest_aiding(encoder, aiding, angle, EDGE_VAR if timed else COUNT_VAR, encoder.edge_at)
     aiding[A_RATE] = max(-FASTEST, min(rate, FASTEST))
 
 
@@ -119,7 +119,9 @@ def measure_rest(encoder: Any, sample: Array, aiding: Array) -> None:
     if encoder.placed == 0:
         encoder.placed, encoder.beyond, encoder.beyond_var = 1, sample[BEYOND], sample[BEYOND_VAR]
     beyond = encoder.beyond if sample[RISING] != 0.0 else -encoder.beyond
-    leave(encoder, aiding, encoder.edge_angle + beyond * QUANTUM, encoder.beyond_var * QUANTUM_VAR, sample[NOW])
+    write_rest_aiding(
+        encoder, aiding, encoder.edge_angle + beyond * QUANTUM, encoder.beyond_var * QUANTUM_VAR, sample[NOW]
+    )
 
 
 @kernel
@@ -130,7 +132,7 @@ def take_edge(encoder: Any, sample: Array) -> None:
 
 
 @kernel
-def leave(encoder: Any, aiding: Array, angle: float, var: float, valid_at: float) -> None:
+def write_rest_aiding(encoder: Any, aiding: Array, angle: float, var: float, valid_at: float) -> None:
     """Aiding of the encoder itself, of a head that rests: no joint passed, no systematic error."""
     aiding[:] = 0.0
     yaw = angle % TURN

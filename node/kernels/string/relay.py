@@ -9,18 +9,20 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.arithmetic.angles import wrap, wrap_positive
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import held, kept_angle, offset_angle
-from node.kernels.arithmetic.quantity import Constant, angle
+from node.kernels.arithmetic.angles import wrap_angle, wrap_positive
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import bounded_variance, kept_angle, offset_angle
+from node.kernels.arithmetic.quantity import Constant, angle_quantity
 from node.kernels.filter.covariance import set_apart
 from node.kernels.filter.priors import stamp_var
-from node.kernels.record.filter_record import PENDING, Err, Status
+from node.kernels.record.filter_record import PENDING, CycleStatus, Err
 from node.kernels.record.ring import make_room
 
-SAME: Final = Constant(1e-9, angle(2e-9).fixed)  # rad, between two offsets of one string; a binary angle is coarser
-PSI, D = constant(Err.YAW), constant(Err.STAMP)
-REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
+SAME: Final = Constant(
+    1e-9, angle_quantity(2e-9).fixed
+)  # rad, between two offsets of one string; a binary angle is coarser
+PSI, D = kernel_constant(Err.YAW), kernel_constant(Err.STAMP)
+REFERENCE_CHANGED = int(CycleStatus.REFERENCE_CHANGED)
 
 
 @kernel
@@ -42,7 +44,7 @@ def offer_aiding(
     it refreshes the age and nothing else.
     """
     status = 0
-    if hops != state.reference_hops or abs(wrap(offset - offset_angle(state.reference_offset))) > SAME:
+    if hops != state.reference_hops or abs(wrap_angle(offset - offset_angle(state.reference_offset))) > SAME:
         status = change_reference(state, config, systematic_var, offset, hops)
     elif sequence == state.last_sequence:
         if state.pending == 0 and state.yaw_known == 1:
@@ -55,10 +57,10 @@ def offer_aiding(
     slot = make_room(state, valid_at)
     state.pending_at[slot] = valid_at
     state.pending_yaw[slot] = kept_angle(wrap_positive(yaw + offset))
-    state.pending_var[slot] = held(yaw_var) + config.aiding_floor_var
+    state.pending_var[slot] = bounded_variance(yaw_var) + config.aiding_floor_var
     state.pending_sequence[slot] = sequence
     state.last_sequence = sequence
-    state.systematic_var = held(systematic_var)
+    state.systematic_var = bounded_variance(systematic_var)
     return status
 
 
@@ -66,14 +68,14 @@ def offer_aiding(
 def change_reference(state: Any, config: Any, systematic_var: float, offset: float, hops: int) -> int:
     """The chain above was made up anew: the yaw may step by the errors of the old and the new joints."""
     first = state.reference_hops < 0
-    step_var = state.systematic_var + held(systematic_var)
+    step_var = state.systematic_var + bounded_variance(systematic_var)
     state.reference_hops = hops
     state.reference_offset = kept_angle(offset)
-    state.systematic_var = held(systematic_var)
+    state.systematic_var = bounded_variance(systematic_var)
     state.pending = 0
     if first or state.yaw_known == 0:
         return 0
-    set_apart(state, PSI, held(state.P[PSI, PSI] + step_var))
+    set_apart(state, PSI, bounded_variance(state.P[PSI, PSI] + step_var))
     if stamp_var(config) > 0:
-        set_apart(state, D, held(state.P[D, D] + stamp_var(config)))
+        set_apart(state, D, bounded_variance(state.P[D, D] + stamp_var(config)))
     return REFERENCE_CHANGED

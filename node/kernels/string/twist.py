@@ -11,20 +11,20 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.arithmetic.formats import ANGLE_Q, TORQUE_Q, Array
-from node.kernels.arithmetic.integers import quotient
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import by_type, number, root, square
-from node.kernels.arithmetic.quantity import NONE, variance
+from node.kernels.arithmetic.integers import quotient_q30
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import angular_root, angular_square, as_number, by_type
+from node.kernels.arithmetic.quantity import NONE, variance_quantity
 from node.kernels.filter.resets import open_yaw
-from node.kernels.record.events import Code, tell, told, told_degrees
+from node.kernels.record.events import Code, event_degrees, event_number, queue_event
 from node.kernels.record.node_record import A_HELD, A_TORQUE, A_VALID, A_YAW_VAR
 
-UNKNOWN_VAR: Final = variance(10.0)  # rad^2, of a twist of which nothing is known but for whole turns
-STRING_UNDER_TORQUE, STRING_RELEASED = constant(Code.STRING_UNDER_TORQUE), constant(Code.STRING_RELEASED)
+UNKNOWN_VAR: Final = variance_quantity(10.0)  # rad^2, of a twist of which nothing is known but for whole turns
+STRING_UNDER_TORQUE, STRING_RELEASED = kernel_constant(Code.STRING_UNDER_TORQUE), kernel_constant(Code.STRING_RELEASED)
 
 
-@by_type(lambda torque, stiffness: quotient(torque, max(stiffness, 1)))
-def wound(torque: float, stiffness: float) -> float:
+@by_type(lambda torque, stiffness: quotient_q30(torque, max(stiffness, 1)))
+def twist_angle(torque: float, stiffness: float) -> float:
     """The angle by which a torque winds a tube."""
     return torque / stiffness
 
@@ -32,14 +32,14 @@ def wound(torque: float, stiffness: float) -> float:
 @kernel
 def twist_var(twist: Any) -> float:
     """Variance (rad^2) of the twist in the last aiding used; ``twist`` is a record of dtype ``TWIST``."""
-    return square(twist.std) if twist.known == 1 else 0
+    return angular_square(twist.std) if twist.known == 1 else 0
 
 
 @kernel
 def reaching_var(torsion_var: float, torque: float, stiffness: float) -> float:
     """Variance (rad^2) of the twist between the drive head and the lower end of a tube (N m, N m/rad)."""
-    std = root(torsion_var) + wound(torque, stiffness)
-    return number(min(square(std), UNKNOWN_VAR))
+    std = angular_root(torsion_var) + twist_angle(torque, stiffness)
+    return as_number(min(angular_square(std), UNKNOWN_VAR))
 
 
 @kernel
@@ -54,21 +54,21 @@ def gate_twist(node: Any, settings: Any, aiding: Array) -> bool:
     if under_torque == 1 and settings.torsion_gate == 1:
         twist.wound = 1
         return False
-    std = root(node.down_torsion)
+    std = angular_root(node.down_torsion)
     before = twist.std if twist.known == 1 else std  # after a start anything may have been
     held = twist.held == 1 or twist.known == 0
     change: float = 0
     if under_torque == 1 and held:
         change = std - before
-        if twist.known == 1 and square(change) <= aiding[A_YAW_VAR]:
+        if twist.known == 1 and angular_square(change) <= aiding[A_YAW_VAR]:
             return True  # a change waits until it has grown: a rest is not to be used again and again
     elif under_torque == 1 or held or twist.wound == 1:
-        change = root(square(std) + square(before))
+        change = angular_root(angular_square(std) + angular_square(before))
         if torque != 0 and twist.known == 1:
             code = STRING_UNDER_TORQUE if under_torque == 1 else STRING_RELEASED
-            tell(node, code, told(torque, TORQUE_Q), told_degrees(std, ANGLE_Q), NONE, NONE)
+            queue_event(node, code, event_number(torque, TORQUE_Q), event_degrees(std, ANGLE_Q), NONE, NONE)
     if change != 0 and state.yaw_known == 1:
-        open_yaw(state, square(change))
+        open_yaw(state, angular_square(change))
         state.last_sequence = -1
     twist.known, twist.std, twist.held, twist.wound = 1, std, under_torque, 0
     return True

@@ -14,7 +14,7 @@ scale      innovations beyond the gate that grow in proportion to the rate      
 
 A wrong aiding makes one large innovation that then stays; a wrong gyroscope makes it grow with every cycle, and alike.
 That is how the two are distinguished: what a ripple of the drive, a disc off its centre or a sensor that leans leaves
-between two aidings comes and goes, and is a misfit (``node.kernels.turns.doubts``). A small step is looked at for
+between two aidings comes and goes, and is a misfit (``node.kernels.turns.yaw_doubts``). A small step is looked at for
 longer, for a part of a swing looks like one: of a swing of once a turn (ten aidings at 71 deg/s) six are never alike. A
 string that winds up as it starts, or unwinds below a standing drive head, looks like a step too, until it has: within
 three seconds it is never alike in six while it speeds up, nor in seven however evenly it does. So do, in three, the
@@ -28,33 +28,55 @@ import math
 from typing import Any, Final
 
 from node.kernels.arithmetic.angles import HALF_TURN, WHOLE_TURN
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import coarse, fraction, half, is_number, mean, product, speed, square, times
-from node.kernels.arithmetic.quantity import NONE, factor, rate
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import (
+    angular_product,
+    angular_square,
+    bounded_ratio,
+    coarse_rate,
+    half_of,
+    is_number,
+    mean_of_total,
+    times_factor,
+    turning_rate,
+)
+from node.kernels.arithmetic.quantity import NONE, factor_quantity, rate_quantity
 from node.kernels.record.events import Fault
 from node.kernels.record.node_record import DISAGREEMENTS, MOST_DISAGREEMENTS
 
-GROWTH: Final = factor(1.5)  # sigmas from one aiding to the next, in one direction
-SMALLEST_STEP: Final = rate(math.radians(0.03))  # rad/s
-SMALL_STEP: Final = rate(math.radians(0.15))  # rad/s, up to which a step is looked at for longer
-SMALL_SWING: Final = rate(math.radians(0.3))  # rad/s, likewise, where the string turns at full speed
-SLOWEST_SWING: Final = rate(math.radians(60.0))  # rad/s, from where it does: the slower, the smaller are its swings
-SLOWED: Final = rate(math.radians(10.0))  # rad/s, by which a string that comes to rest has slowed down meanwhile
-LATE_READINGS: Final = rate(math.radians(0.22))  # rad/s, of such that are 6 ms late while it slows by 35 deg/s^2
-STEADY: Final = factor(0.3)  # of the mean mismatch, by which those of one step may differ from it
-WINDING: Final = rate(math.radians(0.15))  # rad/s, from where one of a string that starts is looked at for longer
-UNWINDING: Final = rate(math.radians(0.5))  # rad/s, likewise, of one that rests
-GROSS: Final = rate(math.radians(5.0))  # rad/s, from where a mismatch is a fault however it changes
-SLOWEST_SCALE: Final = rate(math.radians(5.0))  # rad/s, from where a mismatch may be one of scale
+GROWTH: Final = factor_quantity(1.5)  # sigmas from one aiding to the next, in one direction
+SMALLEST_STEP: Final = rate_quantity(math.radians(0.03))  # rad/s
+SMALL_STEP: Final = rate_quantity(math.radians(0.15))  # rad/s, up to which a step is looked at for longer
+SMALL_SWING: Final = rate_quantity(math.radians(0.3))  # rad/s, likewise, where the string turns at full speed
+SLOWEST_SWING: Final = rate_quantity(
+    math.radians(60.0)
+)  # rad/s, from where it does: the slower, the smaller are its swings
+SLOWED: Final = rate_quantity(
+    math.radians(10.0)
+)  # rad/s, by which a string that comes to rest has slowed down meanwhile
+LATE_READINGS: Final = rate_quantity(
+    math.radians(0.22)
+)  # rad/s, of such that are 6 ms late while it slows by 35 deg/s^2
+STEADY: Final = factor_quantity(0.3)  # of the mean mismatch, by which those of one step may differ from it
+WINDING: Final = rate_quantity(
+    math.radians(0.15)
+)  # rad/s, from where one of a string that starts is looked at for longer
+UNWINDING: Final = rate_quantity(math.radians(0.5))  # rad/s, likewise, of one that rests
+GROSS: Final = rate_quantity(math.radians(5.0))  # rad/s, from where a mismatch is a fault however it changes
+SLOWEST_SCALE: Final = rate_quantity(math.radians(5.0))  # rad/s, from where a mismatch may be one of scale
 ONE_MORE: Final = DISAGREEMENTS + 1  # aidings in a row, of a string that slows, or where an aiding was wrong lately
 REMEMBERED: Final = 32  # aidings used, for which one that was wrong is
 STILL_WANTED: Final = 2  # aidings, of a step that was seen before the scale was forgotten
-AT_ONCE, STARTING, AT_REST = constant(0), constant(1), constant(2)  # how long a mismatch is looked at
-GYRO_STEP, GYRO_SCALE = constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
+AT_ONCE, STARTING, AT_REST = (
+    kernel_constant(0),
+    kernel_constant(1),
+    kernel_constant(2),
+)  # how long a mismatch is looked at
+GYRO_STEP, GYRO_SCALE = kernel_constant(Fault.GYRO_STEP), kernel_constant(Fault.GYRO_SCALE)
 
 
 @kernel
-def forget(watch: Any) -> None:
+def reset_aiding_watch(watch: Any) -> None:
     """Begin again: the yaw was set, or the reference is another one. ``watch`` is a record of dtype ``AIDINGS``."""
     watch.left = 0
     watch.at = NONE
@@ -102,8 +124,8 @@ def find_mismatch(
     if rejected == 0:
         watch.seen = 0
         return
-    mismatch = speed(grown, elapsed) if elapsed > 0 else 0
-    if abs(grown) <= times(sigma, GROWTH) or abs(mismatch) < SMALLEST_STEP:
+    mismatch = turning_rate(grown, elapsed) if elapsed > 0 else 0
+    if abs(grown) <= times_factor(sigma, GROWTH) or abs(mismatch) < SMALLEST_STEP:
         watch.seen, found.refuted = 0, 1
         return
     if watch.seen > 0 and (watch.mismatch[watch.seen - 1] < 0) != (mismatch < 0):
@@ -165,7 +187,7 @@ def recent_mismatch(watch: Any) -> float:
     total: float = 0
     for i in range(1, watch.seen):
         total += watch.mismatch[i]
-    return mean(total, watch.seen - 1)
+    return mean_of_total(total, watch.seen - 1)
 
 
 @kernel
@@ -174,7 +196,7 @@ def is_steady(watch: Any, usual: float) -> bool:
     apart: float = 0
     for i in range(1, watch.seen):
         apart = max(apart, abs(watch.mismatch[i] - usual))
-    return bool(apart <= times(abs(usual), STEADY))
+    return bool(apart <= times_factor(abs(usual), STEADY))
 
 
 @kernel
@@ -189,13 +211,13 @@ def is_proportional(watch: Any) -> bool:
     total: float = 0
     for i in range(n):
         slowest, highest, fastest = min(slowest, w[i]), max(highest, w[i]), max(fastest, abs(w[i]))
-        products += product(coarse(m[i]), coarse(w[i]))
-        squares += square(coarse(w[i]))
+        products += angular_product(coarse_rate(m[i]), coarse_rate(w[i]))
+        squares += angular_square(coarse_rate(w[i]))
         total += m[i]
-    if fastest < SLOWEST_SCALE or highest - slowest < times(fastest, STEADY):
+    if fastest < SLOWEST_SCALE or highest - slowest < times_factor(fastest, STEADY):
         return False
-    k, usual = fraction(products, squares), mean(total, n)
+    k, usual = bounded_ratio(products, squares), mean_of_total(total, n)
     for i in range(n):
-        along += square(coarse(m[i] - times(w[i], k)))
-        apart += square(coarse(m[i] - usual))
-    return bool(along < half(half(apart)))
+        along += angular_square(coarse_rate(m[i] - times_factor(w[i], k)))
+        apart += angular_square(coarse_rate(m[i] - usual))
+    return bool(along < half_of(half_of(apart)))

@@ -8,30 +8,43 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.arithmetic.formats import DEG, PERIOD, RATE_Q, TIME_Q, Array
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import angle_of, half, is_number, lasting, square, stamp_square, time_root, turn
-from node.kernels.arithmetic.quantity import NONE, rate, seconds, variance
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import (
+    angle_of,
+    angular_square,
+    half_of,
+    is_number,
+    stamp_square,
+    time_of_cycles,
+    time_root,
+    turned_angle,
+)
+from node.kernels.arithmetic.quantity import NONE, rate_quantity, time_quantity, variance_quantity
 from node.kernels.filter.modes import STATIC_BIAS
 from node.kernels.filter.priors import is_beyond_gate
 from node.kernels.filter.resets import begin_epoch, doubt_stamp, doubt_yaw, open_yaw
-from node.kernels.record.events import Code, tell, told, told_count, told_degrees
+from node.kernels.record.events import Code, event_count, event_degrees, event_number, queue_event
 from node.kernels.record.filter_record import CLOCK_SLACK, Err
 from node.kernels.record.node_record import A_CLOCK_VAR, A_RATE, A_VALID, A_YAW, A_YAW_VAR
-from node.kernels.turns.aiding_watch import forget
-from node.kernels.turns.doubts import is_dated, misfit_var
-from node.kernels.turns.trust import is_faulty
+from node.kernels.turns.aiding_watch import reset_aiding_watch
+from node.kernels.turns.sensor_trust import is_faulty
+from node.kernels.turns.yaw_doubts import is_dated, misfit_var
 
-SLOWEST_REVERSED: Final = rate(5.0 * DEG)  # rad/s, from where encoder and gyroscope are seen to turn against each other
-BACKWARD: Final = seconds(PERIOD)  # s, that a cycle may begin before the end of the last; more is a jump of the clock
-LONGEST_CYCLE: Final = seconds(10.0 * PERIOD)  # s
+SLOWEST_REVERSED: Final = rate_quantity(
+    5.0 * DEG
+)  # rad/s, from where encoder and gyroscope are seen to turn against each other
+BACKWARD: Final = time_quantity(
+    PERIOD
+)  # s, that a cycle may begin before the end of the last; more is a jump of the clock
+LONGEST_CYCLE: Final = time_quantity(10.0 * PERIOD)  # s
 FARTHEST: Final = LONGEST_CYCLE  # s, that a cycle may begin after the end of the last; no rate stands for more
 FAR_OFF: Final = 4  # sigmas, that a clock may be wrong by
-SLACK_VAR: Final = variance(CLOCK_SLACK * CLOCK_SLACK)  # s^2, of a clock that can place an aiding in a turn
-PSI = constant(Err.YAW)
-ENCODER_REVERSED = constant(Code.ENCODER_REVERSED)
-AIDING_UNTIMELY, CLOCK_JUMPED = constant(Code.AIDING_UNTIMELY), constant(Code.CLOCK_JUMPED)
+SLACK_VAR: Final = variance_quantity(CLOCK_SLACK * CLOCK_SLACK)  # s^2, of a clock that can place an aiding in a turn
+PSI = kernel_constant(Err.YAW)
+ENCODER_REVERSED = kernel_constant(Code.ENCODER_REVERSED)
+AIDING_UNTIMELY, CLOCK_JUMPED = kernel_constant(Code.AIDING_UNTIMELY), kernel_constant(Code.CLOCK_JUMPED)
 
 
 @kernel
@@ -44,7 +57,7 @@ def gate_aiding(node: Any, aiding: Array) -> bool:
     state, guard, valid_local = node.filter, node.guard, aiding[A_VALID]
     timely = is_number(valid_local) and not (state.cycles > 0 and valid_local - state.now > LONGEST_CYCLE)
     if not timely and guard.untimely == 0:
-        tell(node, AIDING_UNTIMELY, NONE, NONE, NONE, NONE)
+        queue_event(node, AIDING_UNTIMELY, NONE, NONE, NONE, NONE)
     guard.untimely = 0 if timely else 1
     if not timely:
         return False
@@ -55,7 +68,7 @@ def gate_aiding(node: Any, aiding: Array) -> bool:
     guard.rate, guard.rate_at, guard.aiding_var = aiding[A_RATE], valid_local, aiding[A_YAW_VAR]
     if is_reversed(node) or not is_placed(state, aiding):
         return False
-    if guard.gyro.fault != 0 or contradicts(node, aiding[A_YAW] + node.down_offset, valid_local):
+    if guard.gyro.fault != 0 or contradicts_gyroscope(node, aiding[A_YAW] + node.down_offset, valid_local):
         state.last_sequence = -1  # a repetition at rest is to be judged again
     return True
 
@@ -75,7 +88,7 @@ def doubt_date(node: Any) -> None:
     A date that is another one in every window leaves nothing of the kind, and a time stamp would learn its noise.
     """
     window = node.cluster.delayed[0]
-    if is_dated(node) and half(window.std) < window.lasting:
+    if is_dated(node) and half_of(window.std) < window.lasting:
         doubt_stamp(node.filter, stamp_square(window.lasting))
 
 
@@ -91,11 +104,11 @@ def is_reversed(node: Any) -> bool:
         return False
     if slowest < SLOWEST_REVERSED:
         return bool(guard.reversed == 1 and guard.rate != 0)
-    alike = guard.reversed == 1 or abs(guard.rate + state.now_rate) < half(slowest)
+    alike = guard.reversed == 1 or abs(guard.rate + state.now_rate) < half_of(slowest)
     against = bool((guard.rate < 0) != (state.now_rate < 0) and alike)
     if against and guard.reversed == 0:
-        told, own = told_degrees(guard.rate, RATE_Q), told_degrees(state.now_rate, RATE_Q)
-        tell(node, ENCODER_REVERSED, told, own, NONE, NONE)
+        told, own = event_degrees(guard.rate, RATE_Q), event_degrees(state.now_rate, RATE_Q)
+        queue_event(node, ENCODER_REVERSED, told, own, NONE, NONE)
     guard.reversed = 1 if against else 0
     return against
 
@@ -108,35 +121,35 @@ def is_placed(state: Any, aiding: Array) -> bool:
         return True
     if aiding[A_RATE] != 0 or not is_number(clock_var):
         return False
-    return bool(lasting(clock_var, state.still_cycles) > FAR_OFF * time_root(clock_var))
+    return bool(time_of_cycles(clock_var, state.still_cycles) > FAR_OFF * time_root(clock_var))
 
 
 @kernel
-def contradicts(node: Any, yaw: float, valid_local: float) -> bool:
+def contradicts_gyroscope(node: Any, yaw: float, valid_local: float) -> bool:
     """Whether a reference at rest (rad) is beyond the gate while the gyroscope turns, or of one that turned unaided."""
     state, guard = node.filter, node.guard
     if guard.rate != 0 or state.yaw_known == 0 or state.mode == STATIC_BIAS:
         return False
     if state.still_cycles > 0 and not state.stopped_at > state.last_aided:
         return False
-    then = angle_of(state.now_rate, state.now_yaw) + turn(state.now_rate, valid_local - state.now)
-    return is_beyond_gate(node.config, wrap(yaw - then), state.now_P[PSI, PSI] + guard.aiding_var)
+    then = angle_of(state.now_rate, state.now_yaw) + turned_angle(state.now_rate, valid_local - state.now)
+    return is_beyond_gate(node.config, wrap_angle(yaw - then), state.now_P[PSI, PSI] + guard.aiding_var)
 
 
 @kernel
-def admits(node: Any, start: float, end: float) -> bool:
+def admits_cycle(node: Any, start: float, end: float) -> bool:
     """Whether a cycle of these times (s, own clock) can be run; a clock that jumped begins a new epoch."""
     state, guard = node.filter, node.guard
     plain = is_number(start) and is_number(end) and 0 < end - start <= LONGEST_CYCLE
     ahead = start - state.now if state.cycles > 0 else 0
     jumped = not plain or -ahead > BACKWARD or ahead > FARTHEST
     if jumped and guard.jumped == 0:
-        by = told(start - state.now, TIME_Q) if state.cycles > 0 else told_count(start, 0)
-        tell(node, CLOCK_JUMPED, by if is_number(start) else NONE, NONE, NONE, NONE)
+        by = event_number(start - state.now, TIME_Q) if state.cycles > 0 else event_count(start, 0)
+        queue_event(node, CLOCK_JUMPED, by if is_number(start) else NONE, NONE, NONE, NONE)
     if not jumped and ahead < 0:  # the increments overlap, and the turn that was counted once is in doubt
-        open_yaw(state, square(turn(state.now_rate, ahead)))
+        open_yaw(state, angular_square(turned_angle(state.now_rate, ahead)))
     guard.jumped = 1 if jumped else 0
     if jumped and plain:
         begin_epoch(state)
-        forget(guard.aidings)
+        reset_aiding_watch(guard.aidings)
     return plain

@@ -10,29 +10,38 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.arithmetic.formats import DEG
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import half, lasting, root, scaled, times, unscaled
-from node.kernels.arithmetic.quantity import NONE, angle, rate
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import (
+    angular_root,
+    half_of,
+    indicated_rate,
+    time_of_cycles,
+    times_factor,
+    true_rate,
+)
+from node.kernels.arithmetic.quantity import NONE, angle_quantity, rate_quantity
 from node.kernels.filter.modes import STATIC_BIAS
 from node.kernels.filter.resets import lose_tilt, lose_yaw_ahead, open_biases
-from node.kernels.record.events import Fault, tell
-from node.kernels.record.filter_record import RECENT, Status
+from node.kernels.record.events import Fault, queue_event
+from node.kernels.record.filter_record import RECENT, CycleStatus
 from node.kernels.sensors.sensor_watch import find_faults
 from node.kernels.string.encoder_rate import RATE_AGE
-from node.kernels.turns.aiding_watch import AT_ONCE, AT_REST, STARTING, find_mismatch, forget, keep_newest
-from node.kernels.turns.doubts import follow_jump, follow_misfit, keep_contradiction, misfit_var
+from node.kernels.turns.aiding_watch import AT_ONCE, AT_REST, STARTING, find_mismatch, keep_newest, reset_aiding_watch
 from node.kernels.turns.mismatches import learn_mismatch, recover_gyro
 from node.kernels.turns.odd_force import keeps_out
 from node.kernels.turns.ramps import follow_fit, is_starting, learn_scale_anew
-from node.kernels.turns.trust import SANE_CYCLES, hold, is_faulty, tell_recovery
+from node.kernels.turns.sensor_trust import SANE_CYCLES, hold_safe_state, is_faulty, tell_recovery
+from node.kernels.turns.yaw_doubts import follow_jump, follow_misfit, keep_contradiction, misfit_var
 
 AGREEING: Final = 4  # aidings in a row, until the node is trusted again
-NARROW_STD: Final = angle(1.0 * DEG)  # of an innovation that can show agreement
-CREDIBLE: Final = rate(5.0 * DEG)  # rad/s, from the encoder's rate, of a gyroscope that may be listened to again
-LARGEST_DRIFT: Final = rate(1.0 * DEG)  # rad/s, of a bias since the last rest; more is a fault, or a motion
-BAD_SAMPLE, GYRO_STEP = constant(Fault.BAD_SAMPLE), constant(Fault.GYRO_STEP)
-AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
-REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
+NARROW_STD: Final = angle_quantity(1.0 * DEG)  # of an innovation that can show agreement
+CREDIBLE: Final = rate_quantity(
+    5.0 * DEG
+)  # rad/s, from the encoder's rate, of a gyroscope that may be listened to again
+LARGEST_DRIFT: Final = rate_quantity(1.0 * DEG)  # rad/s, of a bias since the last rest; more is a fault, or a motion
+BAD_SAMPLE, GYRO_STEP = kernel_constant(Fault.BAD_SAMPLE), kernel_constant(Fault.GYRO_STEP)
+AIDED, REJECTED, YAW_RESET = int(CycleStatus.AIDED), int(CycleStatus.REJECTED), int(CycleStatus.YAW_RESET)
+REFERENCE_CHANGED = int(CycleStatus.REFERENCE_CHANGED)
 
 
 @kernel
@@ -41,7 +50,7 @@ def guard_reading(node: Any, settings: Any, saturated: int, at: float) -> None:
     state, guard, turning, force = node.filter, node.guard, node.rate, node.force
     gyro, accelerometer = find_faults(guard.readings, settings, node.raw_rate[:], node.raw_force[:], saturated)
     known = abs(at - guard.rate_at) <= RATE_AGE
-    measured = unscaled(turning[2] - state.static_bias[2] - state.bias[2], state.scale)
+    measured = true_rate(turning[2] - state.static_bias[2] - state.bias[2], state.scale)
     if gyro == 0 and is_faulty(guard.gyro) and known and abs(measured - guard.rate) > CREDIBLE:
         gyro = guard.gyro.fault
     follow_gyro(node, gyro)
@@ -49,38 +58,38 @@ def guard_reading(node: Any, settings: Any, saturated: int, at: float) -> None:
     if gyro != 0:
         for k in range(3):
             turning[k] = state.static_bias[k] + state.bias[k]
-        turning[2] += scaled(guard.rate if known else guard.sane_rate, state.scale)
+        turning[2] += indicated_rate(guard.rate if known else guard.sane_rate, state.scale)
         state.ring_split[state.cycles % RECENT] = 0
     else:
         guard.sane_rate = measured
     if accelerometer != 0 or keeps_out(node):
         for k in range(3):
-            force[k] = -times(node.config.gravity, state.now_down[k])
-    hold(node)
+            force[k] = -times_factor(node.config.gravity, state.now_down[k])
+    hold_safe_state(node)
 
 
 @kernel
 def judge_cycle(node: Any, status: int, at: float) -> None:
     """See what the filter made of the cycle that ended at ``at`` (s, own clock)."""
-    hold(node)
+    hold_safe_state(node)
     state, guard = node.filter, node.guard
     if state.mode == STATIC_BIAS:
         guard.before_steps = NONE  # the constant bias is measured again
     if state.mode == STATIC_BIAS or status & REFERENCE_CHANGED or is_faulty(guard.gyro):
-        forget(guard.aidings)
+        reset_aiding_watch(guard.aidings)
         return
     if guard.reversed == 1 and guard.rate != 0:
-        forget(guard.aidings)
+        reset_aiding_watch(guard.aidings)
         return
     rejected = 1 if status & REJECTED else 0
     reset = 1 if status & YAW_RESET else 0
     if is_settling(node) or is_handled(node):
-        forget(guard.aidings)
+        reset_aiding_watch(guard.aidings)
         return
     if rejected == 0 and (status & AIDED == 0 or reset == 1):
         guard.jump = guard.jump if reset == 0 else 0  # a yaw that was unknown has nothing to be contradicted
         return
-    sigma = root(max(state.innovation_var, 0) + misfit_var(node))
+    sigma = angular_root(max(state.innovation_var, 0) + misfit_var(node))
     patience = patience_of(node)
     find_mismatch(guard.aidings, guard.found, state.innovation, sigma, state.now_rate, at, rejected, reset, patience)
     if guard.gyro.fault == 0:
@@ -136,7 +145,7 @@ def is_settling(node: Any) -> bool:
 def stood_in_this_rest(node: Any) -> bool:
     """Whether the node has stood still since the head did, or the cycle before: half a cycle off the grid of cycles."""
     state = node.filter
-    return bool(state.stopped_at > state.now - half(lasting(state.now, 2 * node.guard.rest_cycles + 3)))
+    return bool(state.stopped_at > state.now - half_of(time_of_cycles(state.now, 2 * node.guard.rest_cycles + 3)))
 
 
 @kernel
@@ -155,7 +164,7 @@ def follow_gyro(node: Any, fault: int) -> None:
     guard, trust = node.guard, node.guard.gyro
     if fault != 0:
         if trust.fault != fault:
-            tell(node, fault, NONE, NONE, NONE, NONE)
+            queue_event(node, fault, NONE, NONE, NONE, NONE)
         if trust.fault == 0:
             trust.cycles = 0
             keep_contradiction(node)
@@ -168,7 +177,7 @@ def follow_gyro(node: Any, fault: int) -> None:
         if trust.sane > SANE_CYCLES:
             trust.proving = 1
             guard.agreed = 0
-            forget(guard.aidings)
+            reset_aiding_watch(guard.aidings)
             lose_yaw_ahead(node.filter)
             open_biases(node.filter, node.config)
     if trust.fault != 0:
@@ -182,7 +191,7 @@ def follow_force(node: Any, fault: int) -> None:
     if fault != 0:
         told = BAD_SAMPLE in (trust.fault, fault)  # by the gyroscope, whose reading it is too
         if trust.fault != fault and not told:
-            tell(node, fault, NONE, NONE, NONE, NONE)
+            queue_event(node, fault, NONE, NONE, NONE, NONE)
         if trust.fault == 0:
             trust.cycles = 0
         trust.fault, trust.proving, trust.sane = fault, 0, 0

@@ -8,26 +8,37 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.arithmetic.formats import DEG, RATE_Q
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import fraction, half, is_number, scale_square, square, times
-from node.kernels.arithmetic.quantity import NONE, factor, rate, rate_variance
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import (
+    angular_square,
+    bounded_ratio,
+    half_of,
+    is_number,
+    scale_square,
+    times_factor,
+)
+from node.kernels.arithmetic.quantity import NONE, factor_quantity, rate_quantity, rate_variance_quantity
 from node.kernels.filter.priors import bias_var, scale_var
 from node.kernels.filter.resets import settle_yaw, take_mismatch
-from node.kernels.record.events import Fault, tell, told_degrees
+from node.kernels.record.events import Fault, event_degrees, queue_event
 from node.kernels.record.filter_record import Err
 from node.kernels.turns.aiding_watch import STEADY
-from node.kernels.turns.doubts import explain_jump
 from node.kernels.turns.ramps import explain_ramp
-from node.kernels.turns.trust import tell_recovery
+from node.kernels.turns.sensor_trust import tell_recovery
+from node.kernels.turns.yaw_doubts import explain_jump
 
-LEARNT_VAR: Final = rate_variance((0.05 * DEG) * (0.05 * DEG))  # (rad/s)^2, error of a bias read from a mismatch
-LARGEST_STEP: Final = rate(10.0 * DEG)  # rad/s, that a bias may take; a gyroscope farther off is not listened to
-SLOWEST_SCALE: Final = rate(DEG)  # rad/s, from where a mismatch tells the size of a scale
-LARGEST_SCALE: Final = factor(0.1)  # 1, that is looked for
-UNSURE: Final = factor(0.1)  # of a step that was read, its error
-TAKEN_BACK: Final = factor(0.2)  # of a step, by which what cancels it may differ
-PSI, BZ, S = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.SCALE)
-GYRO_STEP, GYRO_SCALE = constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
+LEARNT_VAR: Final = rate_variance_quantity(
+    (0.05 * DEG) * (0.05 * DEG)
+)  # (rad/s)^2, error of a bias read from a mismatch
+LARGEST_STEP: Final = rate_quantity(
+    10.0 * DEG
+)  # rad/s, that a bias may take; a gyroscope farther off is not listened to
+SLOWEST_SCALE: Final = rate_quantity(DEG)  # rad/s, from where a mismatch tells the size of a scale
+LARGEST_SCALE: Final = factor_quantity(0.1)  # 1, that is looked for
+UNSURE: Final = factor_quantity(0.1)  # of a step that was read, its error
+TAKEN_BACK: Final = factor_quantity(0.2)  # of a step, by which what cancels it may differ
+PSI, BZ, S = kernel_constant(Err.YAW), kernel_constant(Err.BIAS_Z), kernel_constant(Err.SCALE)
+GYRO_STEP, GYRO_SCALE = kernel_constant(Fault.GYRO_STEP), kernel_constant(Fault.GYRO_SCALE)
 
 
 @kernel
@@ -35,14 +46,14 @@ def learn_mismatch(node: Any) -> None:
     """A lasting mismatch belongs to the sensor: its bias or its scale takes it, and the yaw starts again."""
     state, config, guard = node.filter, node.config, node.guard
     trust, found = guard.gyro, guard.found
-    reconsider(node)
+    reassign_step_to_scale(node)
     explain_jump(node)
     explain_ramp(guard.ramp)
     prior = max(bias_var(config, 2) + state.static_bias_var[2], LEARNT_VAR)
     of_scale = state.P[S, S]
     learnable = found.steady == 1 and abs(found.rate) <= LARGEST_STEP
     if found.fault == GYRO_SCALE and scale_var(config) > 0:
-        change = fraction(abs(found.rate), abs(found.spin)) if abs(found.spin) > SLOWEST_SCALE else LARGEST_SCALE
+        change = bounded_ratio(abs(found.rate), abs(found.spin)) if abs(found.spin) > SLOWEST_SCALE else LARGEST_SCALE
         of_scale = max(of_scale, scale_square(min(change, LARGEST_SCALE)))
         learnable = True
         undo_steps(node)
@@ -50,13 +61,13 @@ def learn_mismatch(node: Any) -> None:
         if not is_number(guard.before_steps):
             guard.before_steps, guard.first_step = state.static_bias[2], abs(found.rate)
         state.static_bias[2] -= found.rate
-        prior += square(times(found.rate, UNSURE))
+        prior += angular_square(times_factor(found.rate, UNSURE))
     take_mismatch(state, prior, of_scale)
     state.rejected = 0
     guard.step.fault = found.fault if found.fault == GYRO_STEP and learnable else 0
     guard.step.rate, guard.step.spin, guard.step.steady = found.rate, found.spin, found.steady
     if trust.fault != found.fault:
-        tell(node, found.fault, told_degrees(found.rate, RATE_Q), told_degrees(found.spin, RATE_Q), NONE, NONE)
+        queue_event(node, found.fault, event_degrees(found.rate, RATE_Q), event_degrees(found.spin, RATE_Q), NONE, NONE)
     if trust.fault == 0:
         trust.cycles = 0
     trust.fault, trust.proving, trust.sane = found.fault, 1 if learnable else 0, 0
@@ -64,12 +75,12 @@ def learn_mismatch(node: Any) -> None:
 
 
 @kernel
-def reconsider(node: Any) -> None:
+def reassign_step_to_scale(node: Any) -> None:
     """What a change of speed takes back was no step but the scale; the constant bias gets back what it took."""
     found, before = node.guard.found, node.guard.step
-    if before.fault == 0 or abs(found.spin - before.spin) < half(abs(before.spin)):
+    if before.fault == 0 or abs(found.spin - before.spin) < half_of(abs(before.spin)):
         return
-    if found.steady == 0 or abs(found.rate + before.rate) > times(abs(before.rate), TAKEN_BACK):
+    if found.steady == 0 or abs(found.rate + before.rate) > times_factor(abs(before.rate), TAKEN_BACK):
         return
     node.filter.static_bias[2] += before.rate
     found.fault, found.rate, found.spin, found.steady = GYRO_SCALE, before.rate, before.spin, 1
@@ -83,7 +94,7 @@ def undo_steps(node: Any) -> None:
     guard.before_steps = NONE
     if not is_number(earlier):
         return
-    if abs(state.static_bias[2] - earlier) < times(guard.first_step, STEADY):
+    if abs(state.static_bias[2] - earlier) < times_factor(guard.first_step, STEADY):
         state.static_bias[2] = earlier
         state.bias[2] = 0
 

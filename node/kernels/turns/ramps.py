@@ -20,30 +20,39 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.arithmetic.formats import ANGLE_Q, DEG, VECTOR_Q
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import half, held, mean, ratio, root, square, times, turn
-from node.kernels.arithmetic.quantity import NONE, factor, rate, variance
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import (
+    angular_root,
+    angular_square,
+    bounded_variance,
+    half_of,
+    mean_of_total,
+    quantity_ratio,
+    times_factor,
+    turned_angle,
+)
+from node.kernels.arithmetic.quantity import NONE, factor_quantity, rate_quantity, variance_quantity
 from node.kernels.filter.resets import doubt_yaw, forget_scale, open_yaw
-from node.kernels.record.events import Code, tell, told, told_degrees
+from node.kernels.record.events import Code, event_degrees, event_number, queue_event
 from node.kernels.record.filter_record import RING, Err
 from node.kernels.string.twist import twist_var
 
-LEAST_CHANGE: Final = rate(5.0 * DEG)  # rad/s, from one cycle to the next, on a ramp
+LEAST_CHANGE: Final = rate_quantity(5.0 * DEG)  # rad/s, from one cycle to the next, on a ramp
 REACH: Final = 10  # cycles after it, whose aidings still show what it did
 LONGEST: Final = 16  # cycles; rates that change for longer are a drive that swings
 MOST: Final = 16  # variances, that one innovation counts for
-MOST_TIMES: Final = factor(16.0)
-LIMIT: Final = factor(36.0)  # sum of innovation^2 / variance, from where the ramp does not fit
+MOST_TIMES: Final = factor_quantity(16.0)
+LIMIT: Final = factor_quantity(36.0)  # sum of innovation^2 / variance, from where the ramp does not fit
 CONTRADICTED: Final = 4  # variances, from where the head at rest and the turn to it do not fit
-LARGEST: Final = variance(DEG**2)  # rad^2, variance of an innovation that counts by itself
-LEAST_DOUBT: Final = variance((0.002 * DEG) ** 2)  # rad^2, that is none any more
+LARGEST: Final = variance_quantity(DEG**2)  # rad^2, variance of an innovation that counts by itself
+LEAST_DOUBT: Final = variance_quantity((0.002 * DEG) ** 2)  # rad^2, that is none any more
 STARTING: Final = 14  # cycles of a string that has started, in which it may wind up, or be taken for a scale
 AGES: Final = 1000  # cycles, that are counted
-FAST: Final = rate(20.0 * DEG)  # rad/s, from where the scale is learnt
-SLOW: Final = rate(0.5 * DEG)  # rad/s, up to which nothing turns back
-ASYMMETRY: Final = factor(2e-3)  # of an angle turned back, its error
-S = constant(Err.SCALE)
-AIDING_DOUBTED = constant(Code.AIDING_DOUBTED)
+FAST: Final = rate_quantity(20.0 * DEG)  # rad/s, from where the scale is learnt
+SLOW: Final = rate_quantity(0.5 * DEG)  # rad/s, up to which nothing turns back
+ASYMMETRY: Final = factor_quantity(2e-3)  # of an angle turned back, its error
+S = kernel_constant(Err.SCALE)
+AIDING_DOUBTED = kernel_constant(Code.AIDING_DOUBTED)
 
 
 @kernel
@@ -68,7 +77,7 @@ def follow_ramp(node: Any) -> None:
         ramp.left = 0
     if state.still_cycles > 0:
         ramp.cycles, ramp.back = 0, 0
-        ramp.scale, ramp.scale_std = state.scale, root(state.P[S, S])
+        ramp.scale, ramp.scale_std = state.scale, angular_root(state.P[S, S])
     else:
         ramp.cycles = min(ramp.cycles + 1, AGES)
         follow_back(node, state.ring_end[newest % RING] - state.ring_start[newest % RING])
@@ -78,7 +87,7 @@ def follow_ramp(node: Any) -> None:
 def begin_ramp(ramp: Any) -> None:
     """Begin the sums anew; the ramp before, if it fitted, halves what is in doubt."""
     if ramp.doubted == 0:
-        ramp.doubt = half(ramp.doubt) if ramp.doubt > LEAST_DOUBT else 0
+        ramp.doubt = half_of(ramp.doubt) if ramp.doubt > LEAST_DOUBT else 0
     ramp.lasted = ramp.seen = ramp.doubted = ramp.opened = 0
     ramp.misfit = ramp.largest = 0
 
@@ -93,8 +102,10 @@ def follow_back(node: Any, period: float) -> None:
     if abs(spin) < SLOW or ramp.sense == 0 or (spin < 0) == (ramp.sense < 0):
         return
     before = ramp.back
-    ramp.back += turn(abs(spin), period)
-    open_yaw(state, square(times(ramp.back, ASYMMETRY)) - square(times(before, ASYMMETRY)))
+    ramp.back += turned_angle(abs(spin), period)
+    open_yaw(
+        state, angular_square(times_factor(ramp.back, ASYMMETRY)) - angular_square(times_factor(before, ASYMMETRY))
+    )
 
 
 @kernel
@@ -104,9 +115,9 @@ def follow_fit(node: Any, rejected: int) -> None:
     whole = state.innovation_var
     if ramp.left == 0 or not whole > 0 or (rejected == 1 and state.rejected == 1):
         return
-    own = square(state.innovation)
+    own = angular_square(state.innovation)
     ramp.seen += 1
-    ramp.misfit += min(ratio(own, whole), MOST_TIMES)
+    ramp.misfit += min(quantity_ratio(own, whole), MOST_TIMES)
     ramp.largest = max(ramp.largest, min(own, MOST * min(whole, LARGEST)))
     if ramp.misfit > LIMIT:
         doubt_ramp(node, own, rejected)
@@ -129,8 +140,8 @@ def has_come_to_rest(node: Any) -> bool:
 def doubt_stop(node: Any, var: float) -> None:
     """The head at rest is not where its string was turned to: a variance (rad^2) for whichever of the two is right."""
     state, ramp = node.filter, node.guard.ramp
-    doubt = held(max(ramp.doubt, var))
-    state.systematic_var = held(state.systematic_var + doubt - ramp.doubt)
+    doubt = bounded_variance(max(ramp.doubt, var))
+    state.systematic_var = bounded_variance(state.systematic_var + doubt - ramp.doubt)
     ramp.doubt = doubt
 
 
@@ -141,11 +152,13 @@ def doubt_ramp(node: Any, own: float, rejected: int) -> None:
     ramp.doubt = max(ramp.doubt, ramp.largest)
     if ramp.doubted == 0:
         ramp.doubted = 1
-        sigma = told_degrees(root(ramp.doubt), ANGLE_Q)
-        tell(node, AIDING_DOUBTED, told(mean(ramp.misfit, ramp.seen), VECTOR_Q), sigma, NONE, NONE)
+        sigma = event_degrees(angular_root(ramp.doubt), ANGLE_Q)
+        queue_event(
+            node, AIDING_DOUBTED, event_number(mean_of_total(ramp.misfit, ramp.seen), VECTOR_Q), sigma, NONE, NONE
+        )
     if rejected == 1:
         return
-    ramp.doubt = held(max(ramp.doubt, own))
+    ramp.doubt = bounded_variance(max(ramp.doubt, own))
     if ramp.opened == 0:
         ramp.opened = 1
         doubt_yaw(state, ramp.largest)
@@ -156,7 +169,7 @@ def doubt_ramp(node: Any, own: float, rejected: int) -> None:
 def learn_scale_anew(node: Any) -> None:
     """What the ramp taught of the scale is forgotten; that it is open again makes as much of a step as a start."""
     ramp = node.guard.ramp
-    forget_scale(node.filter, ramp.scale, square(ramp.scale_std))
+    forget_scale(node.filter, ramp.scale, angular_square(ramp.scale_std))
     ramp.cycles = 0
 
 

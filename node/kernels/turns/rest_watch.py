@@ -12,22 +12,31 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.arithmetic.formats import ANGLE_Q, DEG, FORCE_Q, RATE_Q
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.arithmetic.operations import factor_of, half, held, mean, root, square, times, turn
-from node.kernels.arithmetic.quantity import NONE, rate, seconds
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import (
+    angular_root,
+    angular_square,
+    bounded_variance,
+    factor_of,
+    half_of,
+    mean_of_total,
+    times_factor,
+    turned_angle,
+)
+from node.kernels.arithmetic.quantity import NONE, rate_quantity, time_quantity
 from node.kernels.filter.modes import STATIC_BIAS, TRACKING, UNBIASED_STILL_RATE
 from node.kernels.filter.priors import bias_var, calm_bias, noise_over, widen_bias
 from node.kernels.filter.resets import doubt_yaw, move_bias
-from node.kernels.record.events import Code, tell, told_degrees
+from node.kernels.record.events import Code, event_degrees, queue_event
 from node.kernels.record.filter_record import RING
 
 CYCLES: Final = 8  # whose mean and spread are looked at
 SETTLING: Final = 2  # cycles of a rest before those
 LOUDEST: Final = 4  # spread of a rest, in variances of the noise
 MOVED: Final = 5  # sigmas of a bias in use
-LARGEST: Final = rate(6.0 * DEG)  # rad/s, of a bias; the slow alignment turn is faster
-RATE_AGE: Final = seconds(3.0)  # s, of the encoder's word
-BIAS_MOVED = constant(Code.BIAS_MOVED)
+LARGEST: Final = rate_quantity(6.0 * DEG)  # rad/s, of a bias; the slow alignment turn is faster
+RATE_AGE: Final = time_quantity(3.0)  # s, of the encoder's word
+BIAS_MOVED = kernel_constant(Code.BIAS_MOVED)
 
 
 @kernel
@@ -52,7 +61,7 @@ def mean_rate(state: Any, k: int) -> float:
     total: float = 0
     for n in range(CYCLES):
         total += state.ring_rate[(state.cycles - 1 - n) % RING, k]
-    return mean(total, CYCLES)
+    return mean_of_total(total, CYCLES)
 
 
 @kernel
@@ -65,7 +74,7 @@ def is_calm(state: Any, config: Any) -> bool:
         usual = mean_rate(state, k)
         loudest = noise_over(config, k, LOUDEST * (CYCLES - 1), period)
         for n in range(CYCLES):
-            total += square(state.ring_rate[(state.cycles - 1 - n) % RING, k] - usual)
+            total += angular_square(state.ring_rate[(state.cycles - 1 - n) % RING, k] - usual)
             if total > loudest:  # at once: of integers no larger sum would fit
                 return False
     return True
@@ -77,7 +86,7 @@ def mean_down(state: Any, k: int, first: int) -> float:
     total: float = 0
     for n in range(CYCLES // 2):
         total -= state.ring_force[(state.cycles - 1 - first - n) % RING, k]
-    return factor_of(mean(total, CYCLES // 2), FORCE_Q)
+    return factor_of(mean_of_total(total, CYCLES // 2), FORCE_Q)
 
 
 @kernel
@@ -91,11 +100,11 @@ def is_tilting(state: Any, config: Any) -> bool:
         i, j = (k + 1) % 3, (k + 2) % 3
         turning_i = mean_rate(state, i) - state.static_bias[i] - state.bias[i]
         turning_j = mean_rate(state, j) - state.static_bias[j] - state.bias[j]
-        moved = times(turning_j, mean_down(state, i, 0)) - times(turning_i, mean_down(state, j, 0))
-        turned = turn(moved, apart)
-        seen += times(turned, mean_down(state, k, 0) - mean_down(state, k, CYCLES // 2))
-        told += times(turned, factor_of(turned, ANGLE_Q))
-    return bool(seen > half(told))
+        moved = times_factor(turning_j, mean_down(state, i, 0)) - times_factor(turning_i, mean_down(state, j, 0))
+        turned = turned_angle(moved, apart)
+        seen += times_factor(turned, mean_down(state, k, 0) - mean_down(state, k, CYCLES // 2))
+        told += times_factor(turned, factor_of(turned, ANGLE_Q))
+    return bool(seen > half_of(told))
 
 
 @kernel
@@ -116,7 +125,7 @@ def has_moved(state: Any, config: Any) -> bool:
             moved = moved or bool(abs(usual) > UNBIASED_STILL_RATE)
             continue
         var = state.static_bias_var[k] + bias_var(config, k) + noise_over(config, k, 1, length)
-        moved = moved or bool(abs(usual - state.static_bias[k]) > MOVED * root(var))
+        moved = moved or bool(abs(usual - state.static_bias[k]) > MOVED * angular_root(var))
     return moved
 
 
@@ -134,15 +143,15 @@ def take_bias(node: Any, settings: Any, since: int) -> None:
         var = noise_over(config, k, 1, CYCLES * period) + bias_var(config, k)
         if known and settings.imus == 1:
             widen_bias(config, k, abs(moved))
-        move_bias(state, k, usual, held(var), bias_var(config, k))
+        move_bias(state, k, usual, bounded_variance(var), bias_var(config, k))
     moved_z = off
     if not known:
         state.mode = TRACKING
-    doubt_yaw(state, square(turn(moved_z * since, period)) if known else 0)
+    doubt_yaw(state, angular_square(turned_angle(moved_z * since, period)) if known else 0)
     state.rejected = 0
     guard.before_steps = NONE
     guard.step.fault = 0
-    tell(node, BIAS_MOVED, told_degrees(moved_z, RATE_Q), NONE, NONE, NONE)
+    queue_event(node, BIAS_MOVED, event_degrees(moved_z, RATE_Q), NONE, NONE, NONE)
 
 
 @kernel

@@ -15,23 +15,23 @@ from typing import Any, Final
 
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.operations import half, mean, number, square, turn
-from node.kernels.arithmetic.quantity import rate, seconds
+from node.kernels.arithmetic.operations import angular_square, as_number, half_of, mean_of_total, turned_angle
+from node.kernels.arithmetic.quantity import rate_quantity, time_quantity
 from node.kernels.record.filter_record import RING
 from node.kernels.record.ring import is_split
 
-LEAST_BEND: Final = rate(0.5 * DEG)  # rad/s, that no noise of a gyroscope reaches
+LEAST_BEND: Final = rate_quantity(0.5 * DEG)  # rad/s, that no noise of a gyroscope reaches
 SWINGING: Final = 10  # cycles that bend, less those that do not, from where it is no ramp
 MOST: Final = 16  # likewise, that are counted
 MEMORY: Final = 16  # cycles over which the variance is averaged
-REACH: Final = seconds(PERIOD / (36.0 * math.sqrt(3.0)))  # s, largest error (rad) of a bend of 1 rad/s
+REACH: Final = time_quantity(PERIOD / (36.0 * math.sqrt(3.0)))  # s, largest error (rad) of a bend of 1 rad/s
 
 
 @kernel
 def swing_var(node: Any) -> float:
     """Variance (rad^2) of the yaw by a drive that swings."""
     swing = node.guard.swing
-    return number(swing.excess) if swing.cycles >= SWINGING else 0
+    return as_number(swing.excess) if swing.cycles >= SWINGING else 0
 
 
 @kernel
@@ -44,7 +44,7 @@ def follow_swing(node: Any) -> None:
     if is_split(state, newest - 1):
         swing.cycles, swing.excess = 0, 0 * swing.excess
         return
-    outer = half(state.ring_rate[newest % RING, 2] + state.ring_rate[(newest - 2) % RING, 2])
+    outer = half_of(state.ring_rate[newest % RING, 2] + state.ring_rate[(newest - 2) % RING, 2])
     bend = abs(outer - state.ring_rate[(newest - 1) % RING, 2])
     swing.cycles = min(swing.cycles + 1, MOST) if bend > LEAST_BEND else max(swing.cycles - 1, 0)
-    swing.excess += mean(square(turn(bend, REACH)) - swing.excess, MEMORY)
+    swing.excess += mean_of_total(angular_square(turned_angle(bend, REACH)) - swing.excess, MEMORY)

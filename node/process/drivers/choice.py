@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from node.errors import ConfigurationError
+from node.errors import NodeConfigurationError
 from node.process.drivers.mpu6500 import ADDRESS, Mpu6500, open_bus
 from node.process.drivers.quadrature import QuadratureFile
-from node.process.drivers.replay import ReplayEncoder, ReplayImu
+from node.process.drivers.replay_drivers import ReplayEncoder, ReplayImu
 from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.drivers.timed import TimedEncoder, TimedImu
 
@@ -27,9 +27,9 @@ def imu_source(text: str) -> ImuSource:
     """
     kind, _, rest = text.partition(":")
     if kind == "replay" and rest:
-        return ReplayImu(recording("imu", rest))
+        return ReplayImu(recording_path("imu", rest))
     if kind == "timed" and rest:
-        return TimedImu(recording("imu", rest))
+        return TimedImu(recording_path("imu", rest))
     if kind == "mpu6500":
         bus, _, address = rest.partition(":")
         try:
@@ -38,7 +38,7 @@ def imu_source(text: str) -> ImuSource:
             number, at = -1, ADDRESS
         if 0 <= number <= LARGEST_BUS and at in ADDRESSES:
             return Mpu6500(lambda: open_bus(number), at)
-    raise ConfigurationError(f"imu: expected {IMU_FORMS}, got {text!r}")
+    raise NodeConfigurationError(f"imu: expected {IMU_FORMS}, got {text!r}")
 
 
 def encoder_source(text: str) -> EncoderSource:
@@ -51,15 +51,15 @@ def encoder_source(text: str) -> EncoderSource:
     """
     kind, _, rest = text.partition(":")
     if kind == "replay" and rest:
-        return ReplayEncoder(recording("counter", rest))
+        return ReplayEncoder(recording_path("counter", rest))
     if kind == "timed" and rest:
-        return TimedEncoder(recording("counter", rest))
+        return TimedEncoder(recording_path("counter", rest))
     if kind == "counter" and rest:
         return QuadratureFile(Path(rest))
-    raise ConfigurationError(f"counter: expected {COUNTER_FORMS}, got {text!r}")
+    raise NodeConfigurationError(f"counter: expected {COUNTER_FORMS}, got {text!r}")
 
 
-def recording(option: str, name: str) -> Path:
+def recording_path(option: str, name: str) -> Path:
     """File of a recording.
 
     Raises
@@ -68,5 +68,5 @@ def recording(option: str, name: str) -> Path:
         When there is none of that name.
     """
     if not Path(name).is_file():
-        raise ConfigurationError(f"{option}: expected a recording, got {name}, which is not a file")
+        raise NodeConfigurationError(f"{option}: expected a recording, got {name}, which is not a file")
     return Path(name)

@@ -77,13 +77,13 @@ class FrameClock:
             highest = min(counted * (1.0 + spread), period * (1.0 + self._spread))
             period = farthest_period(t, n, lowest, highest) if lowest < highest else counted
             self._spread = KNOWN if len(t) >= ENOUGH else LARGEST_ERROR
-        earliest, latest = bounds(t, n, period)
+        earliest, latest = phase_bounds(t, n, period)
         self.period, self.std = period, (latest - earliest) / math.sqrt(12.0)
         self.newest = min(0.5 * (earliest + latest) + period * n[-1], t[-1])
 
 
 @kernel
-def bounds(t: Array, n: Array, period: float) -> tuple[float, float]:
+def phase_bounds(t: Array, n: Array, period: float) -> tuple[float, float]:
     """What the phase a is between (s), by reads at ``t`` (k,) s that brought the counts ``n`` (k,)."""
     earliest = latest = t[0] - period * n[0]
     for k in range(1, t.shape[0]):
@@ -98,7 +98,7 @@ def farthest_period(t: Array, n: Array, lowest: float, highest: float) -> float:
     for _ in range(NARROWER):
         third = (highest - lowest) / 3.0
         low, high = lowest + third, highest - third
-        (after, before), (later, sooner) = bounds(t, n, low), bounds(t, n, high)
+        (after, before), (later, sooner) = phase_bounds(t, n, low), phase_bounds(t, n, high)
         if before - after < sooner - later:
             lowest = low
         else:

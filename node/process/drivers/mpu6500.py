@@ -20,8 +20,8 @@ from typing import Any, Final, Protocol, cast
 import numpy as np
 
 from node.errors import SensorError
+from node.process.drivers.fifo_window import Array, parts_of
 from node.process.drivers.frame_clock import FrameClock
-from node.process.drivers.parts import Array, parts_of
 from node.process.drivers.source import ImuSample
 
 SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, ACCEL_CONFIG_2 = 0x19, 0x1A, 0x1B, 0x1C, 0x1D

@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from node.errors import SensorError
-from node.firmware.encoder import EncoderSample
+from node.firmware.encoder_node import EncoderSample
 
 LARGEST_JUMP = 4096 * 4  # counts between two reads: four turns in a cycle are no drive head
 WORDS = {"forward": True, "backward": False}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from node.errors import SensorError
-from node.firmware.encoder import EncoderSample
+from node.firmware.encoder_node import EncoderSample
 from node.kernels.sensors.correction import USUAL
 from telemetry.messages import Scalar, Severity, Vector3
 
@@ -59,7 +59,7 @@ class EncoderSource(Protocol):
         """Release the file."""
 
 
-class Alarm:
+class SourceSupervisor:
     """Keeps a source going: reports its fault and its return once each, and restarts it after every failure."""
 
     def __init__(self, source: ImuSource | EncoderSource, say: Say, name: str, imu: int = 0) -> None:
@@ -91,7 +91,7 @@ class SafeImu:
 
     def __init__(self, source: ImuSource, say: Say, imu: int = 0) -> None:
         self._source = source
-        self._alarm = Alarm(source, say, "sensor", imu)
+        self._alarm = SourceSupervisor(source, say, "sensor", imu)
 
     def read(self, begin: float, end: float) -> ImuSample:
         """Mean over the cycle, whatever happens."""
@@ -103,7 +103,7 @@ class SafeEncoder:
 
     def __init__(self, source: EncoderSource, say: Say) -> None:
         self._source = source
-        self._alarm = Alarm(source, say, "encoder")
+        self._alarm = SourceSupervisor(source, say, "encoder")
 
     def read(self, now: float) -> EncoderSample | None:
         """The counter, or None."""

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from node.errors import SensorError
-from node.firmware.encoder import EncoderSample
+from node.firmware.encoder_node import EncoderSample
 from node.kernels.sensors.correction import USUAL
-from node.process.drivers.replay import ENCODER_COLUMNS, IMU_COLUMNS, Rows, load_rows
+from node.process.drivers.replay_drivers import ENCODER_COLUMNS, IMU_COLUMNS, Rows, load_rows
 from node.process.drivers.source import ImuSample
 
 
@@ -49,7 +49,7 @@ class TimedImu:
             raise SensorError(f"{self._path}: not started")
         k = int(np.searchsorted(self._times, t, side="right"))
         if not 0 < k < len(self._times):
-            raise SensorError(outside(self._path, self._times, t))
+            raise SensorError(outside_recording_text(self._path, self._times, t))
         before, after = self._times[k - 1], self._times[k]
         share = (t - before) / (after - before)
         return np.asarray((1.0 - share) * self._integral[k - 1] + share * self._integral[k])
@@ -73,7 +73,7 @@ class TimedEncoder:
             raise SensorError(f"{self._path}: not started")
         k = int(np.searchsorted(self._rows[:, 0], now, side="right"))
         if not 0 < k < len(self._rows):
-            raise SensorError(outside(self._path, self._rows[:, 0], now))
+            raise SensorError(outside_recording_text(self._path, self._rows[:, 0], now))
         _, count, edge_at, rising, *earlier = self._rows[k - 1].tolist()
         return EncoderSample(int(count), edge_at, rising > 0.5, earlier=tuple(earlier))
 
@@ -99,6 +99,6 @@ def load_times(path: Path, columns: tuple[int, ...]) -> Rows:
     return rows
 
 
-def outside(path: Path, times: Rows, t: float) -> str:
+def outside_recording_text(path: Path, times: Rows, t: float) -> str:
     """Error text for a time outside the recording."""
     return f"{path}: recorded from {times[0]:.1f} s to {times[-1]:.1f} s, asked for {t:.1f} s"

@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.fusion.resolve import direction_angles, resolve_direction
-from node.firmware.alignment import METHODS, angles_of
-from node.firmware.settings import Kernel
+from node.firmware.alignment_orders import METHODS, angles_of
+from node.firmware.tube_settings import Kernel
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import default_config
 from sim.rig.direct_string import DirectString
@@ -51,7 +51,7 @@ class Setup:
     kernel: Kernel = "float64"
 
     def tables(self) -> Tables:
-        """The scenario."""
+        """Tables of the scenario."""
         usual = float(default_config()[0]["force_std"])
         return {
             "rig": complete_string(1),
@@ -72,7 +72,7 @@ class Setup:
 
 @dataclass(frozen=True, slots=True)
 class AlignmentOutcome:
-    """What one method found from one seed; rad."""
+    """Result of one method on one seed; rad."""
 
     error: tuple[float, float]  # of pitch and roll
     std: tuple[float, float]  # as the node says
@@ -89,7 +89,7 @@ class Turn:
         self.tilts = np.array(self.world.sensors.tilt(1))
 
     def run(self, method: str) -> AlignmentOutcome:
-        """Let one node rest, turn and rest; ``method`` is of its alignment, ``none`` leaves the mount as it is."""
+        """Let one node rest, turn and rest; ``method`` aligns it, ``none`` leaves the mount as it is."""
         string, asked_at = DirectString(self.world), self.world.begin + REST - ASKED
         for cycle in string.steps():
             end = self.world.cycle_end(cycle)

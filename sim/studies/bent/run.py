@@ -29,7 +29,7 @@ from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.fusion.transport import carry_directions
 from groundstation.survey.well.ellipsoid import coverage_radius
 from groundstation.survey.well.trajectory import Trajectory, TrajectoryPoint
-from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.angles import wrap_angle
 from sim.rig.direct_string import DirectString, Survey
 from sim.studies.pool import Step, over_cores, seed_jobs
 from sim.studies.scenarios import CALIBRATED, Tables, change_sections
@@ -100,7 +100,7 @@ def run_seed(job: tuple[Tables, int]) -> BentRun:
 
 
 def trajectory_errors(world: World, surveys: Sequence[Survey]) -> BentRun:
-    """What a ground station makes of all surveys, told either way, against the hole."""
+    """Errors of a ground station's trajectory of all surveys, by what it was told of the string."""
     hole = world.scenario.hole
     shared = SharedErrors()
     stations = fused_stations(world, surveys, shared)
@@ -113,7 +113,7 @@ def trajectory_errors(world: World, surveys: Sequence[Survey]) -> BentRun:
     for told in KINDS:
         end, directions = locate_toe(collar, stations, shared, told)
         azimuths = [direction_angles(one.lean, one.down)[1] for one in directions]
-        found.azimuth_error[told] = np.array([wrap(a - b[1]) for a, b in zip(azimuths, true, strict=True)])
+        found.azimuth_error[told] = np.array([wrap_angle(a - b[1]) for a, b in zip(azimuths, true, strict=True)])
         found.azimuth_std[told] = np.array([angle_stds(d.lean, d.down, d.total_cov)[1] for d in directions])
         error = end.position - toe
         found.toe_error[told] = float(np.linalg.norm(error))

@@ -57,7 +57,7 @@ def run_seed(job: tuple[tuple[Tables, int], int]) -> Array:
 
 
 def mean_of(model: Model, count: int) -> Model:
-    """Errors of the mean of so many gyroscopes; those of the time stamps are of the aiding, which all share."""
+    """Errors of the mean of ``count`` gyroscopes; those of the time stamps are of the aiding, common to all."""
     part = 1.0 / math.sqrt(count)
     return replace(model, noise=part * model.noise, bias_std=part * model.bias_std, scale_std=part * model.scale_std)
 
@@ -81,7 +81,7 @@ def mean_variances(world: World, bound: Bound) -> Array:
 
 
 def within_phase(times: Array, begin: float, end: float) -> npt.NDArray[np.bool_]:
-    """Which of the ``times`` (n,) are in a phase."""
+    """Mask (n,) of the ``times`` that lie in a phase; s."""
     return (times >= begin) & (times <= end)
 
 
@@ -102,7 +102,7 @@ def rows_of(name: str, setup: Tables, runs: Sequence[Array]) -> list[dict[str, A
 
 
 def verdict_lines(result: dict[str, Any]) -> list[str]:
-    """What is gained at most in the azimuth of a survey, as it is said first and in the end."""
+    """Lines on the largest gain in the azimuth of a survey, at the first survey and in the end."""
     lines = []
     for kind in KINDS[2:]:
         rows = [row for row in result["cases"] if row["quantity"] == f"yaw {kind}"]

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from node.firmware.settings import Kernel
+from node.firmware.tube_settings import Kernel
 from node.kernels.record.filter_record import Scheme
 from sim.studies.epochs import EpochRun, resting_string, run_seed
 from sim.studies.pool import Step, over_cores, seed_jobs

@@ -49,14 +49,14 @@ class YawPool:
 
 
 def yaw_pool(strings: int, run_all: RunAll) -> YawPool:
-    """Let the real filter run in ``strings`` simulated strings and keep what it knew at rest."""
+    """Run the real filter in ``strings`` simulated strings and collect its errors at rest."""
     runs = run_all(run_seed, [(resting_string(TUBES), FIRST_STRING + seed) for seed in range(strings)])
     error, var = (np.concatenate([getattr(r, name)[~r.turning] for r in runs]).T for name in ("error", "var"))
     return YawPool(error, var)
 
 
 class Rig:
-    """One string of one well and what is wrong with it."""
+    """One string of one well and its errors."""
 
     def __init__(self, seed: int) -> None:
         self.random = stream(seed, Stream.WELLS)

@@ -33,7 +33,7 @@ MPU = {"frames_hz": 50.0, "low_pass_hz": 20.0}
 
 @dataclass(frozen=True, slots=True)
 class DisturbanceCase:
-    """One row. ``unseen``: why one node by itself cannot know of it, where that is so."""
+    """One row. ``unseen``: reason for which one node by itself cannot observe it, if any."""
 
     key: str
     name: str

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from groundstation.survey.fusion.resolve import angle_stds, direction_angles, known_direction, resolve_direction
 from groundstation.survey.fusion.transport import carry_directions
-from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.angles import wrap_angle
 from sim.rig.direct_string import DirectString, StringRun
 from sim.studies.field.cases import ALL, BLOCKS, CASES, DisturbanceCase
 from sim.studies.pool import Step, over_cores, seed_jobs
@@ -102,7 +102,7 @@ def judge_lowest_tube(world: World, run: StringRun) -> DisturbanceRun:
 
 
 def judge_azimuths(world: World, surveys: Sequence[SurveyMeasurement]) -> tuple[Array, Array]:
-    """Errors and standard deviations (surveys,), rad, of what a ground station that knows its string makes of them."""
+    """Errors and standard deviations (surveys,), rad, of the azimuths of a ground station that knows its string."""
     hole = world.scenario.hole
     found = []
     for one in surveys:
@@ -117,7 +117,7 @@ def judge_azimuths(world: World, surveys: Sequence[SurveyMeasurement]) -> tuple[
     true = [hole.direction(world.bit_depth(one.station_at))[1] for one in surveys]
     azimuths = [direction_angles(one.lean, one.down)[1] for one in found]
     stds = [angle_stds(one.lean, one.down, one.total_cov)[1] for one in found]
-    return np.array([wrap(a - b) for a, b in zip(azimuths, true, strict=True)]), np.array(stds)
+    return np.array([wrap_angle(a - b) for a, b in zip(azimuths, true, strict=True)]), np.array(stds)
 
 
 def judged_cycles(world: World) -> tuple[Mask, Mask]:
@@ -173,14 +173,14 @@ def rms_deg(runs: Sequence[DisturbanceRun], when: str) -> float:
 
 
 def unflagged_nees(runs: Sequence[DisturbanceRun], when: str) -> float:
-    """Mean of error^2 / variance over the cycles that are not told of; NaN where all are."""
+    """Mean of error^2 / variance over the unflagged cycles; NaN where all are flagged."""
     chosen = [getattr(r, when) & ~r.told for r in runs]
     found = np.concatenate([r.error[c] ** 2 / r.var[c] for r, c in zip(runs, chosen, strict=True)])
     return float(np.mean(found)) if len(found) else math.nan
 
 
 def verdict_lines(result: dict[str, Any]) -> list[str]:
-    """How many rows are reached, and which are not."""
+    """Line on how many rows are reached, and which are not."""
     missed = [r["case"] for r in result["cases"] if not r["reached"]]
     unseen = [r["case"] for r in result["cases"] if not r["reached"] and r["unseen"]]
     reached = len(result["cases"]) - len(missed)

@@ -35,7 +35,7 @@ def drive_float64(state: Any, config: Any, rate: Array, force: Array, first: int
 
 @kernel
 def drive_fixed(state: Any, config: Any, rate: Array, force: Array, first: int) -> None:
-    """The same of the integer kernel."""
+    """Cycles of the integer kernel, one for each row of ``rate`` (n, 3), each with an aiding."""
     for k in range(rate.shape[0]):
         start = (1000 << TIME_Q) + (first + k) * STEP
         fixed_cycle.run_cycle(state, config, rate[k], force, start, start + STEP, 1)

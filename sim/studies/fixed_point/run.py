@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from node.firmware.settings import Kernel
+from node.firmware.tube_settings import Kernel
 from node.kernels.arithmetic.angles import wrap_positive
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.filter.float64.cycle import run_cycle
@@ -36,7 +36,7 @@ LIMITS = {"yaw_deg": 0.03, "sigma": 0.02}
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """What both kernels get in one cycle; SI and radians."""
+    """Inputs of both kernels in one cycle; SI and radians."""
 
     start: float
     end: float
@@ -49,7 +49,7 @@ class Input:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Fixed less float64 at the end of every cycle."""
+    """Differences, fixed less float64, at the end of every cycle."""
 
     yaw_deg: np.ndarray[Any, np.dtype[np.float64]]
     sigma: np.ndarray[Any, np.dtype[np.float64]]  # ratio less 1
@@ -196,6 +196,6 @@ def run_study(cycles: int, seeds: int, seed: int, step: Step) -> dict[str, Any]:
 
 
 def verdict_lines(result: dict[str, Any]) -> list[str]:
-    """Whether the limits hold."""
+    """Lines on whether the limits hold."""
     asked = f"yaw within {LIMITS['yaw_deg']:g} deg, sigma within {LIMITS['sigma']:.0%}, no overflow"
     return [f"{asked}: {'yes' if result['within'] else 'no'}"]

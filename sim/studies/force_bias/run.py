@@ -18,7 +18,7 @@ import numpy.typing as npt
 from groundstation.survey.fusion.force_biases import ForceBias, Look, look_of, solve_biases
 from groundstation.survey.fusion.resolve import angle_stds, direction_angles, resolve_direction
 from groundstation.survey.fusion.shared import SharedErrors
-from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.angles import wrap_angle
 from sim.rig.direct_string import DirectString, Survey
 from sim.studies.pool import Step, over_cores, seed_jobs
 from sim.studies.scenarios import Tables
@@ -37,7 +37,7 @@ INCLINATIONS_DEG = (2.0, 20.0)
 
 @dataclass(frozen=True, slots=True)
 class BiasRun:
-    """One seed: what the surveys of each stop came to."""
+    """Results of one seed, stop by stop."""
 
     measured: list[Array]  # rad, azimuth errors as they were read
     corrected: list[Array]  # rad, of the tubes that would have had a block by then
@@ -85,7 +85,7 @@ def run_seed(job: tuple[Tables, int]) -> BiasRun:
 
 
 def judge_biases(world: World, surveys: Sequence[Survey]) -> BiasRun:
-    """Stop by stop, each with what was known after the one before."""
+    """Biases stop by stop, each with what was known after the one before."""
     found = BiasRun([], [], [], [], [], [])
     looks = looks_of(world, surveys)
     known: dict[int, ForceBias] = {}
@@ -105,7 +105,7 @@ def judge_biases(world: World, surveys: Sequence[Survey]) -> BiasRun:
 
 
 def bias_of(world: World, tube: int) -> Array:
-    """Of a tube's accelerometer (3,), m/s^2."""
+    """Bias (3,) of a tube's accelerometer, m/s^2."""
     drift = world.sensors.drift(tube)
     return np.zeros(AXES) if drift is None else drift.bias
 
@@ -113,7 +113,7 @@ def bias_of(world: World, tube: int) -> Array:
 def azimuth_error(world: World, look: Look, bias: Array) -> float:
     """Error (rad) of the azimuth of a survey of a straight hole that is read with a bias (3,) taken off."""
     lean = look.lean - look.by_force @ bias
-    return wrap(direction_angles(lean, 1.0)[1] - world.scenario.hole.direction(0.0)[1])
+    return wrap_angle(direction_angles(lean, 1.0)[1] - world.scenario.hole.direction(0.0)[1])
 
 
 def azimuth_std(look: Look, bias_cov: Array) -> float:
@@ -171,7 +171,7 @@ def milli_g(values: Array) -> float:
 
 
 def verdict_lines(result: dict[str, Any]) -> list[str]:
-    """What is left after five stops of the error of the first."""
+    """Lines on the part of the first stop's error that is left after five stops."""
     lines = []
     for first, last in zip(result["cases"][::STOPS], result["cases"][STOPS - 1 :: STOPS], strict=True):
         part = last["azimuth_corrected_deg"] / first["azimuth_measured_deg"]

@@ -60,7 +60,7 @@ def verdict_lines(result: dict[str, Any]) -> list[str]:
 
 
 def assumed_world_lines(result: dict[str, Any]) -> list[str]:
-    """In the world that the filter assumes: whether either NEES is 1 within what the other studies allow."""
+    """Lines for the world that the filter assumes: whether either NEES is 1 within the other studies' limits."""
     low, high = EVERY
     lines = []
     for of, words in (("nees", "NEES"), ("nees_total", "NEES with joints and mounts")):
@@ -71,12 +71,12 @@ def assumed_world_lines(result: dict[str, Any]) -> list[str]:
 
 
 def rough_world_lines(result: dict[str, Any]) -> list[str]:
-    """In a rough world: from where to where the NEES goes of what a node states, its doubts included."""
+    """Lines for a rough world: range of the NEES of a node's stated variance, its doubts included."""
     least, most = column_range(result, "nees_total")
     return [f"NEES with joints, mounts and doubts: {least:.3g} to {most:.3g} (1: honest, less: more careful than that)"]
 
 
 def column_range(result: dict[str, Any], of: str) -> tuple[float, float]:
-    """Least and most of a column."""
+    """Smallest and largest value of a column."""
     found = [row[of] for row in result["cases"]]
     return min(found), max(found)

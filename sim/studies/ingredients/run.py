@@ -14,7 +14,7 @@ from typing import Any
 from sim.rig.plain_encoder import LINES
 from sim.studies.lab import LAB, REST, ROTATING
 from sim.studies.pool import Step
-from sim.studies.published_form import DELAY_MS, FORMS, setup_of
+from sim.studies.published_form.published_forms import DELAY_MS, FORMS, run_published, setup_of
 from sim.studies.scenarios import Tables, change_sections, on_off
 from sim.studies.trials import interval_row, over_seeds, rms_deg
 
@@ -50,7 +50,7 @@ def count_steps(seeds: int) -> int:
 def run_study(seeds: int, step: Step) -> dict[str, Any]:
     """Rows of every ingredient, mode of aiding and window."""
     cases = []
-    with over_seeds(seeds, step) as run_all:
+    with over_seeds(seeds, step, run_published) as run_all:
         for name, setup in INGREDIENTS.items():
             studied = "-".join(f"{end:g}" for end in STUDIED_DEG.get(name, ())) or None
             for mode, link in MODES.items():

@@ -40,7 +40,7 @@ class Model:
 
 @dataclass(frozen=True, slots=True)
 class NodeTimeline:
-    """What happens to a node: ``times`` (n,) s, the mean spin before each (rad/s), and what is measured at it.
+    """Timeline of a node: ``times`` (n,) s, the mean spin before each (rad/s), and the measurements at it.
 
     ``var`` is that of an aiding (rad^2), infinite where there is none; ``rate`` is the spin at that moment.
     """
@@ -89,7 +89,7 @@ def node_timeline(world: World) -> NodeTimeline:
 
 
 def bound_of(model: Model, course: NodeTimeline, begin: float) -> Bound:
-    """Variances of the yaw by all that came before each time, and by all of the course; it begins at ``begin`` (s)."""
+    """Variances (rad^2) of the yaw by all data before each time, and by all data; begins at ``begin`` (s)."""
     count = len(course.times)
     before, after = np.empty((2, count, STATES, STATES))
     steps = np.empty((count, STATES, STATES))

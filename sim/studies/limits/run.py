@@ -118,7 +118,7 @@ def compare_with_bound(world: World, run: StringRun, bound: Bound) -> LimitRun:
 
 
 def last_word(run: StringRun, first: Survey, ends: Array, before: float) -> Survey:
-    """What was said last of a survey before rig time ``before`` (s)."""
+    """Last revision of a survey that was sent before rig time ``before`` (s)."""
     again = [one for one in run.revisions if (one.cycle, one.tube) == (first.cycle, first.tube)]
     return next((one for one in reversed(again) if ends[one.said] < before), first)
 
@@ -137,6 +137,6 @@ def rows_of(case: LimitCase, runs: Sequence[LimitRun]) -> list[dict[str, Any]]:
 
 
 def verdict_lines(result: dict[str, Any]) -> list[str]:
-    """Which figures are farther from the bound than they are to be."""
+    """Line on the figures that are too far from the bound."""
     far = [f"{one['case']}, {one['quantity']}: {one['ratio']:.2f}" for one in result["cases"] if one["ratio"] > RATIO]
     return [f"more than {RATIO:g} times the bound: {'; '.join(far)}" if far else f"within {RATIO:g} times the bound"]

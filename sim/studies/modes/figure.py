@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 
 from groundstation.report.style import GREY, INK, LIGHT, MARKERS, SERIES, WRONG, new_figure, styled, tidy_ticks
 from sim.studies.modes.run import CASES
-from sim.studies.published_form import FORMS
+from sim.studies.published_form.published_forms import FORMS
 
 Array = npt.NDArray[np.float64]
 BEFORE_STOP = 130.0  # s, from which the yaw is drawn

@@ -16,7 +16,7 @@ import numpy as np
 
 from sim.studies.lab import LAB, ONCE_AIDED, REST, ROTATING, LabRun
 from sim.studies.pool import Step
-from sim.studies.published_form import EXPERIMENTS, FORMS, rows_of
+from sim.studies.published_form.published_forms import EXPERIMENTS, FORMS, rows_of, run_published
 from sim.studies.scenarios import Tables, change_sections, complete_string, on_off
 from sim.studies.trials import interval_row, over_seeds, rms_deg, yaw_error_trace
 
@@ -101,7 +101,7 @@ def run_study(name: str, seeds: int, step: Step) -> dict[str, Any]:
     """
     cases: list[dict[str, Any]] = []
     traces: dict[str, Any] = {}
-    with over_seeds(seeds, step) as run_all:
+    with over_seeds(seeds, step, run_published) as run_all:
         for setup, of_setup in cases_by_setup(name):
             runs = run_all(setup)
             for case in of_setup:

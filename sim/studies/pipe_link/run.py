@@ -40,7 +40,7 @@ WARM_C = (20.0, 100.0, 200.0)
 
 
 def count_steps() -> int:
-    """All at once."""
+    """Steps of the study: one."""
     return 1
 
 
@@ -121,7 +121,7 @@ def loss_db(mode: WaveguideMode, frequency: float, rho: float) -> float | None:
 
 
 def verdict_lines(result: dict[str, Any]) -> list[str]:
-    """What the tables come to."""
+    """Lines that sum the tables up."""
     reaches = [line["reach_m"] for line in result["grades"]]
     worst = max(result["cases"], key=lambda line: abs(line["difference_percent"] or 0.0))
     return [

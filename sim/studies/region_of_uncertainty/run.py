@@ -25,7 +25,7 @@ Array = npt.NDArray[np.float64]
 
 
 def count_steps() -> int:
-    """All at once."""
+    """Steps of the study: one."""
     return 1
 
 

@@ -38,7 +38,7 @@ SHARES = (0.5, 0.75, 0.9, 0.95)
 
 
 def received_dbm(soil: Soil, distance: npt.ArrayLike, log: Logarithm = np.log10) -> Array:
-    """Received power, dBm, without a word about water that no soil holds: the published case has it."""
+    """Received power, dBm, without a warning of water that no soil holds: the published case has it."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PorosityWarning)
         eps = soil_permittivity(soil, FREQUENCY)
@@ -53,7 +53,7 @@ def texture_triangle() -> tuple[Array, Array]:
 
 
 def count_steps(tubes: int) -> int:
-    """The figures, then the drilling."""
+    """Steps of the study: the figures, then the drilling."""
     del tubes
     return 2
 
@@ -156,7 +156,7 @@ def measure_delivery(tubes: int) -> tuple[list[dict[str, Any]], Array, Array]:
 
 
 def verdict_lines(result: dict[str, Any]) -> list[str]:
-    """What the tables come to."""
+    """Lines that sum the tables up."""
     natural = [row for row in result["cases"] if "natural" in row["case"]]
     margins = [row["margin_db"] for row in result["map"]]
     return [

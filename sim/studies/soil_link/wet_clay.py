@@ -50,7 +50,7 @@ def surveys_of(world: World) -> list[tuple[SurveyMeasurement, float]]:
 
 
 def drill_wet_clay(world: World, folder: Path) -> PlainBase:
-    """Run the string in this process to its end; its surface end."""
+    """Run the string in this process to its end; returns its surface end."""
     base = PlainBase()
     builders: dict[int, Build] = {BASE: lambda: base}
     builders[ENCODER] = partial(EncoderProcess, private_folder(folder, "encoder"), reach=world.reach)
@@ -69,7 +69,7 @@ def expected_delivery(world: World, surveys: list[tuple[SurveyMeasurement, float
 
 
 def joints_above(world: World, survey: SurveyMeasurement) -> list[LossyJoint]:
-    """Joints of a survey's way up, as they were when it was made.
+    """Joints that a survey passes on its way up, as they were when it was made.
 
     Raises
     ------

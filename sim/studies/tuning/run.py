@@ -72,7 +72,7 @@ def settled_dps(error: Array) -> float:
 
 
 def convergence_time(error: Array) -> float | None:
-    """Time from the stop to convergence, s; None where there is none."""
+    """Time from the stop to convergence, s; None if it does not converge."""
     settled, start = settled_dps(error), abs(RESIDUAL_DPS)
     if settled > 0.5 * start:
         return None

@@ -38,7 +38,7 @@ PUBLISHED_CM = {"north": 1.18, "east": 2.0}
 
 
 def direction_reading(inclination_deg: float, azimuth_deg: float) -> Direction:
-    """Reading of a direction."""
+    """Return a reading of a direction."""
     i, a = math.radians(inclination_deg), math.radians(azimuth_deg)
     horizontal = math.sin(i) * np.array([math.cos(a), math.sin(a)])
     return Direction(horizontal, math.cos(i), READING_STD**2 * np.eye(2), np.zeros((2, 0)))
@@ -63,7 +63,7 @@ def errors_cm(changed: int, now: Direction, scheme: Weighting) -> Array:
 
 
 def count_steps() -> int:
-    """All at once."""
+    """Steps of the study: one."""
     return 1
 
 

@@ -2,8 +2,8 @@
 
 The assumed world is that of the other studies: noise, clocks, drive and encoder as the filter models them. The rough
 one is `scenarios/rough.toml`, all of its disturbances at once, upon the same strings under the same aiding. Untold
-twist is left out there: one that is wound up once and is smaller than what the scale factor may be off is seen by
-nobody (docs/field.md), and every row would show the same tenth of a degree. The first row has it, by itself.
+twist is left out there: one that is wound up once and is smaller than what the scale factor may be off is not
+observable (docs/field.md), and every row would show the same tenth of a degree. The first row has it, by itself.
 
 NEES is of the yaw against everything that the node states, doubts and the errors of joints and mounts included.
 """
@@ -59,7 +59,7 @@ ALL, CONSISTENCY = "all", "consistency"
 
 @dataclass(frozen=True, slots=True)
 class WorldsJob:
-    """A string in either world, how many of its seeds, and which figures are of it; none: its consistency."""
+    """A string in either world, the number of its seeds, and its figures; without figures its consistency."""
 
     worlds: dict[str, Tables]
     seeds: int
@@ -67,7 +67,7 @@ class WorldsJob:
 
 
 def jobs_of(part: str, seeds: int, string_seeds: int, strings: int, hops: int) -> list[WorldsJob]:
-    """What one part, or all, runs."""
+    """Jobs of one part of the study, or of all."""
     jobs = []
     for name in (name for name in CASES if part in (ALL, name)):
         if name == FIRST:

@@ -1,15 +1,16 @@
 """The integer loop and the float64 loop side by side, and the node that is built on either."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from node.errors import ConfigurationError
+from node.errors import NodeConfigurationError
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.kernel_choice import Loop, kernel_of
-from node.firmware.settings import TubeSettings
+from node.firmware.kernel_choice import Loop, added_loop, kernel_of
 from node.firmware.tube import Tube
+from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import CEILING, DEG, PERIOD, VAR_Q, Array
 from node.kernels.filter.fixed.cycle import run_cycle as fixed_run_cycle
 from node.kernels.filter.float64.cycle import run_cycle
@@ -17,14 +18,14 @@ from node.kernels.filter.resets import forget_bias
 from node.kernels.record.filter_conversion import (
     LARGEST,
     config_in_integers,
-    held,
+    saturated_integer,
     show_aiding,
     show_covariance,
     show_cycle,
     state_in_integers,
     to_fixed,
 )
-from node.kernels.record.filter_record import STATE, Status, default_config, new_state
+from node.kernels.record.filter_record import STATE, CycleStatus, default_config, new_state
 from node.kernels.record.integer_filter import FIXED_STATE
 from node.kernels.record.integer_node import new_integers
 from node.kernels.record.node_record import END, JOINED, START, new_node
@@ -33,9 +34,9 @@ from node.kernels.step.node_step import (
     ONWARD,
     REFUSED,
     USED,
-    enter,
+    begin_step,
+    end_step,
     hand_down,
-    leave,
     node_aiding,
     node_step,
     own_systematic,
@@ -44,8 +45,9 @@ from node.kernels.step.node_step import (
 )
 from node.kernels.step.shadow_words import learn_aiding, learn_inputs, learn_node, show_node
 from node.kernels.string.relay import offer_aiding
-from node.kernels.turns.doubts import noise_var
+from node.kernels.turns.yaw_doubts import noise_var
 from sim.studies.fixed_point.run import AIDING_VAR, LIMITS, compare_kernels, draw_inputs, rows_of
+from sim.studies.published_form.published_step import leave_published, published_loop
 from telemetry.messages import Aiding, NodeState
 
 WORK_SPACE = {"h", "ph", "gain"}
@@ -117,11 +119,11 @@ def test_the_configuration_fits() -> None:
 def test_a_reading_beyond_the_range_is_held_and_counted() -> None:
     config, state, fixed = default_config()[0], new_state(default_config())[0], FixedNode()
     status = fixed.run_cycle(state, config, np.array([0.0, 0.0, 40.0]), np.array([0.0, 0.0, -1e9]), 0.0, PERIOD, 1)
-    assert status & Status.RATE_EXCEEDED
+    assert status & CycleStatus.RATE_EXCEEDED
     assert fixed.overflows == 2
     before = state.tobytes()
     nothing = np.array([0.0, np.nan, 0.0])
-    assert fixed.run_cycle(state, config, nothing, np.zeros(3), PERIOD, 2 * PERIOD, 1) == Status.BAD_SAMPLE
+    assert fixed.run_cycle(state, config, nothing, np.zeros(3), PERIOD, 2 * PERIOD, 1) == CycleStatus.BAD_SAMPLE
     assert state.tobytes() == before
 
 
@@ -148,7 +150,7 @@ def test_whatever_lies_beyond_the_range_is_held_at_its_end(value: float, sign: i
 )
 def test_what_is_learnt_is_the_nearest_integer(value: float, nearest: int, beyond: int) -> None:
     record = np.zeros(1, FIXED_STATE)[0]
-    assert (held(record, value), record["overflows"]) == (nearest, beyond)
+    assert (saturated_integer(record, value), record["overflows"]) == (nearest, beyond)
 
 
 def test_what_nobody_changed_is_not_read_back() -> None:
@@ -201,11 +203,11 @@ def reports(kernel: str, *, forget: bool) -> list[NodeState]:
     return said
 
 
-def in_parts(loop: Loop) -> Loop:
+def in_parts(loop: Loop, leave: Callable[..., int] = end_step) -> Loop:
     """The step and the aiding of a loop, called part by part from Python."""
 
     def step(nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
-        waits, node = enter(nodes, settings, parameters, readings, moment), nodes[0]
+        waits, node = begin_step(nodes, settings, parameters, readings, moment), nodes[0]
         if waits == REFUSED:
             return say_events(node)
         times = float(moment[START]), float(moment[END]), int(moment[JOINED])
@@ -229,13 +231,13 @@ def in_parts(loop: Loop) -> Loop:
 def integers_in_parts(loop: Loop) -> Loop:
     """The step and the aiding of the integers, called part by part from Python over their own record."""
     integers = new_integers()
-    nodes, crews, own = integers["node"], integers["settings"], integers[0]
+    nodes, own_settings, own = integers["node"], integers["settings"], integers[0]
 
     def step(shadows: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
         learn_node(shadows, settings, integers)
         learn_inputs(parameters, readings, moment, integers)
         waits, node, times = (
-            enter(nodes, crews, own["parameters"], own["readings"], own["moment"]),
+            begin_step(nodes, own_settings, own["parameters"], own["readings"], own["moment"]),
             nodes[0],
             own["moment"],
         )
@@ -244,20 +246,20 @@ def integers_in_parts(loop: Loop) -> Loop:
         else:
             reading = node["rate"], node["force"], int(times[START]), int(times[END]), int(times[JOINED])
             status = fixed_run_cycle(node["filter"], node["config"], *reading)
-            says = leave(nodes, crews, times, int(status), waits)
+            says = end_step(nodes, own_settings, times, int(status), waits)
         show_node(shadows, settings, integers, True)
         return int(says)
 
     def aiding(shadows: Array, settings: Array, given: Array) -> int:
         learn_node(shadows, settings, integers)
         learn_aiding(given, integers)
-        node, taken, gates = nodes[0], own["aiding"].tolist(), take_aiding(nodes, crews, own["aiding"])
+        node, taken, gates = nodes[0], own["aiding"].tolist(), take_aiding(nodes, own_settings, own["aiding"])
         if gates & USED:
             yaw, yaw_var, _, _, _, valid_at, sequence, hops, *_ = taken
             about = own_systematic(node), int(node["down_offset"]), valid_at, sequence, hops
             node["noticed"] |= offer_aiding(node["filter"], node["config"], yaw, yaw_var + noise_var(node), *about)
         if gates & ONWARD:
-            hand_down(nodes, crews)
+            hand_down(nodes, own_settings)
         show_node(shadows, settings, integers, False)
         return int(gates)
 
@@ -267,8 +269,12 @@ def integers_in_parts(loop: Loop) -> Loop:
 @pytest.mark.slow
 @pytest.mark.parametrize("kernel", ["float64", pytest.param("fixed", marks=pytest.mark.statistical), "published"])
 def test_the_compiled_step_does_what_the_step_in_parts_does(kernel: str) -> None:
-    whole, parts = tube(kernel), tube(kernel)
-    parts._loop = (integers_in_parts if kernel == "fixed" else in_parts)(parts._loop)
+    with added_loop("published", published_loop):
+        whole, parts = tube(kernel), tube(kernel)
+    if kernel == "fixed":
+        parts._loop = integers_in_parts(parts._loop)
+    else:
+        parts._loop = in_parts(parts._loop, leave_published if kernel == "published" else end_step)
     for k, given in enumerate(draw_inputs(1300, 8)):
         around = RigContext(True, 1 + k // 900, given.end, 1e-8 * (1 + k // 500), True)
         rate = given.rate if k % 211 else (np.nan, 0.0, 0.0)
@@ -307,5 +313,5 @@ def test_float64_is_the_default_and_untouched() -> None:
 
 
 def test_an_unknown_kernel_is_refused() -> None:
-    with pytest.raises(ConfigurationError, match="kernel: expected one of float64, fixed, published, got Q16"):
+    with pytest.raises(NodeConfigurationError, match="kernel: expected one of float64, fixed, got Q16"):
         replace(TubeSettings(1), kernel="Q16")

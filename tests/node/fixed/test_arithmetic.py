@@ -8,8 +8,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels.arithmetic.integers import bits, clamp, inverse_root, mul, quotient, reciprocal, shift
-from node.kernels.arithmetic.trigonometry import counts, difference, exponential, radians, sine_cosine
+from node.kernels.arithmetic.integers import (
+    bit_length,
+    clamp_and_count,
+    inverse_root,
+    multiply_q31,
+    quotient_q30,
+    reciprocal_parts,
+    rounded_shift,
+)
+from node.kernels.arithmetic.trigonometry import (
+    counts_difference,
+    counts_to_radians,
+    exponential_decay,
+    radians_to_counts,
+    sine_cosine,
+)
 from node.kernels.record.integer_filter import FIXED_STATE
 
 WIDE = st.integers(-(2**62) + 1, 2**62 - 1)
@@ -18,36 +32,36 @@ TURN = 2**32
 
 @given(WIDE, st.integers(-(2**31), 2**31))
 def test_a_product_is_exact_to_its_last_bit(wide: int, factor: int) -> None:
-    assert abs(mul(wide, factor) - wide * factor / 2**31) <= 0.5 + abs(wide * factor / 2**31) * 2**-52
-    assert 2 * abs(mul(wide, factor) * 2**31 - wide * factor) <= 2**31
+    assert abs(multiply_q31(wide, factor) - wide * factor / 2**31) <= 0.5 + abs(wide * factor / 2**31) * 2**-52
+    assert 2 * abs(multiply_q31(wide, factor) * 2**31 - wide * factor) <= 2**31
 
 
 @given(st.integers(1, 2**62 - 1))
 def test_reciprocal_and_root_are_good_to_thirty_bits(value: int) -> None:
-    mantissa, exponent = reciprocal(value)
+    mantissa, exponent = reciprocal_parts(value)
     assert mantissa * 2.0 ** (-61 - exponent) * value == pytest.approx(1.0, rel=2**-29)
     mantissa, exponent = inverse_root(value)
     assert mantissa * 2.0 ** (-61 - exponent) * math.sqrt(value) == pytest.approx(1.0, rel=3e-9)
-    assert bits(value) == value.bit_length()
+    assert bit_length(value) == value.bit_length()
 
 
 @given(st.integers(-(2**52), 2**52), st.integers(2**20, 2**36))
 def test_quotient(wide: int, divisor: int) -> None:
     exact = Fraction(wide * 2**30, divisor)
     of_mantissa, of_product = abs(exact) / 2**29, 1 + Fraction(2**30, divisor)  # the two errors add up
-    assert abs(quotient(wide, divisor) - exact) <= of_mantissa + of_product
+    assert abs(quotient_q30(wide, divisor) - exact) <= of_mantissa + of_product
 
 
 @given(st.integers(-(2**40), 2**40), st.integers(-20, 62))
 def test_shift_rounds_to_the_nearest(value: int, right: int) -> None:
-    assert abs(shift(value, right) - value * 2.0**-right) <= 0.5
+    assert abs(rounded_shift(value, right) - value * 2.0**-right) <= 0.5
 
 
 def test_what_does_not_fit_is_held_and_counted() -> None:
     record = np.zeros(1, FIXED_STATE)[0]
-    assert [clamp(record, value, 100) for value in (100, -100, 0)] == [100, -100, 0]
+    assert [clamp_and_count(record, value, 100) for value in (100, -100, 0)] == [100, -100, 0]
     assert record["overflows"] == 0
-    assert [clamp(record, value, 100) for value in (101, -(2**60))] == [100, -100]
+    assert [clamp_and_count(record, value, 100) for value in (101, -(2**60))] == [100, -100]
     assert record["overflows"] == 2
 
 
@@ -73,17 +87,17 @@ def test_sine_and_cosine_of_any_angle(angle: int) -> None:
 
 @given(st.integers(-(2**31), 2**31 - 1))
 def test_binary_angles_and_radians(binary: int) -> None:
-    angle = radians(binary)
+    angle = counts_to_radians(binary)
     assert angle * 2.0**-40 == pytest.approx(binary * 2.0 * math.pi / TURN, rel=1e-9, abs=2.0**-40)
-    assert abs(counts(angle, 40) - binary) <= 1 + abs(binary) * 1e-9
+    assert abs(radians_to_counts(angle, 40) - binary) <= 1 + abs(binary) * 1e-9
 
 
 @given(st.integers(0, TURN - 1), st.integers(-(2**31), 2**31 - 1))
 def test_the_difference_of_binary_angles_wraps(a: int, step: int) -> None:
-    assert difference((a + step) % TURN, a) == step
+    assert counts_difference((a + step) % TURN, a) == step
 
 
 @given(st.floats(0.05, 1e7), st.floats(1e-6, 8.0))
 def test_exponential(tau: float, dt: float) -> None:
     rate, step = round(math.log2(math.e) / tau * 2**42), round(dt * 2**28)
-    assert exponential(rate, step) * 2.0**-31 == pytest.approx(2.0 ** -(rate * step * 2.0**-70), abs=2e-9)
+    assert exponential_decay(rate, step) * 2.0**-31 == pytest.approx(2.0 ** -(rate * step * 2.0**-70), abs=2e-9)

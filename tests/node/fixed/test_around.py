@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.firmware.alignment import rotation
+from node.firmware.alignment_orders import tube_rotation
 from node.kernels.arithmetic.formats import ANGLE_Q, DEG, FORCE_Q, PERIOD, RATE_Q, TIME_Q, VAR_Q, VECTOR_Q, WEIGHT_Q
 from node.kernels.arithmetic.quantity import NO_NUMBER, WARMTH_Q
 from node.kernels.record.filter_conversion import config_in_integers, state_in_integers
@@ -18,14 +18,14 @@ from node.kernels.record.node_record import AIDINGS, DELAYED, GUARD, MISMATCH, N
 from node.kernels.record.sensor_record import OFFSET, PARAMETERS, STATIC, SWEEP
 from node.kernels.record.word_conversion import learn_numbers, learn_words, show_words
 from node.kernels.sensors.alignment import extreme_var, fit_circle, take_extremes, to_tube
-from node.kernels.sensors.cluster import fuse
+from node.kernels.sensors.cluster import fuse_readings
 from node.kernels.sensors.coarse_level import level_coarsely
-from node.kernels.sensors.correction import COLDEST, HOTTEST, calibrate, identity_parameters
+from node.kernels.sensors.correction import COLDEST, HOTTEST, correct_cycle, identity_parameters
 from node.kernels.sensors.delay import make_up_delay
 from node.kernels.sensors.integer_extremes import variance_in_integers
 from node.kernels.sensors.static_average import add_static
 from node.kernels.sensors.sweep import MOST_SAMPLES, add_to_sweep
-from node.kernels.turns.aiding_watch import AT_ONCE, find_mismatch, forget
+from node.kernels.turns.aiding_watch import AT_ONCE, find_mismatch, reset_aiding_watch
 
 G = 9.81
 RATE, PULL = st.floats(-9.0, 9.0), st.floats(-16.0 * G, 16.0 * G)
@@ -72,8 +72,8 @@ def test_readings_are_corrected_alike(rate: Any, pull: Any, temperature: float, 
             block[0][sensor]["bias"][k] = bias * drift * np.array([next(parts) for _ in range(3)])
     floats = np.array(rate), np.array(pull)
     integers = whole(rate, RATE_Q), whole(np.array(pull) / G, FORCE_Q)
-    calibrate(block[0], temperature, *floats)
-    calibrate(learnt(block)[0], round(temperature * 2.0**WARMTH_Q), *integers)
+    correct_cycle(block[0], temperature, *floats)
+    correct_cycle(learnt(block)[0], round(temperature * 2.0**WARMTH_Q), *integers)
     np.testing.assert_allclose(integers[0] * 2.0**-RATE_Q, floats[0], atol=3e-7)
     np.testing.assert_allclose(integers[1] * 2.0**-FORCE_Q * G, floats[1], atol=1e-5)
 
@@ -81,7 +81,7 @@ def test_readings_are_corrected_alike(rate: Any, pull: Any, temperature: float, 
 def test_a_reading_that_is_none_stays_what_it_is() -> None:
     block = np.zeros(1, FIXED_PARAMETERS)
     rate, pull = np.array([1, NO_NUMBER, 3]), np.array([4, 5, 6])
-    calibrate(block[0], 0, rate, pull)
+    correct_cycle(block[0], 0, rate, pull)
     assert (rate.tolist(), pull.tolist()) == ([1, NO_NUMBER, 3], [4, 5, 6])
 
 
@@ -115,8 +115,8 @@ def test_imus_are_fused_alike(imus: Any) -> None:
     readings = np.array([(*rate, *pull) for rate, pull, _ in imus])
     weights = np.array([1.0 / noise**2 for *_, noise in imus])
     floats, integers = np.zeros(6), np.zeros(6, np.int64)
-    fuse(readings, weights, floats)
-    fuse(
+    fuse_readings(readings, weights, floats)
+    fuse_readings(
         np.hstack([whole(readings[:, :3], RATE_Q), whole(readings[:, 3:] / G, FORCE_Q)]),
         whole(weights, WEIGHT_Q),
         integers,
@@ -135,7 +135,7 @@ def test_imus_are_fused_alike(imus: Any) -> None:
 )
 def test_mismatches_are_found_alike(aidings: Any, sigma: float) -> None:
     watch, found = np.zeros(1, AIDINGS), np.zeros(1, MISMATCH)
-    forget(watch[0])
+    reset_aiding_watch(watch[0])
     own, fixed = learnt(watch, ".aidings"), learnt(found)
     now = 1000.0
     for thousandths, spin, elapsed, rejected in aidings:
@@ -184,7 +184,7 @@ def test_a_turn_is_fitted_alike(
     angles *= turns * math.tau / angles[-1]
     down = np.array([np.cos(angles), -np.sin(angles), np.ones(samples)]).T
     down *= [math.sin(lean), math.sin(lean), math.cos(lean)]
-    pulls = -G * down @ rotation(axis) + G * noise * random.standard_normal((samples, 3))
+    pulls = -G * down @ tube_rotation(axis) + G * noise * random.standard_normal((samples, 3))
     sums = np.zeros(1, SWEEP)
     integers = learnt(sums, ".sweeps")
     for pull, angle in zip(pulls, angles, strict=True):

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from node.kernels.arithmetic.formats import CEILING, DEG, PERIOD, VAR_Q
-from node.kernels.filter.fixed.propagation import hold, widen
-from node.kernels.filter.fixed.update import innovation_var, joseph
+from node.kernels.filter.fixed.propagation import limit_variance, widen_variance
+from node.kernels.filter.fixed.update import innovation_var, joseph_update
 from node.kernels.filter.float64.cycle import run_cycle
-from node.kernels.record.filter_record import STATES, Err, Status, default_config, new_state
+from node.kernels.record.filter_record import STATES, CycleStatus, Err, default_config, new_state
 from node.kernels.record.integer_filter import FIXED_STATE
 from node.kernels.step.fixed_node import FixedNode
 from node.kernels.string.relay import offer_aiding
@@ -26,10 +26,10 @@ class Pair:
         self.fixed = FixedNode()
         self.now, self.sequence = 1000.0, 0
 
-    def cycle(self, rate: np.ndarray, force: np.ndarray, dt: float = PERIOD) -> Status:
+    def cycle(self, rate: np.ndarray, force: np.ndarray, dt: float = PERIOD) -> CycleStatus:
         end = self.now + dt
-        self.expected = Status(run_cycle(self.reference, self.config, rate, force, self.now, end, 1))
-        status = Status(self.fixed.run_cycle(self.shadow, self.config, rate, force, self.now, end, 1))
+        self.expected = CycleStatus(run_cycle(self.reference, self.config, rate, force, self.now, end, 1))
+        status = CycleStatus(self.fixed.run_cycle(self.shadow, self.config, rate, force, self.now, end, 1))
         self.now = end
         return status
 
@@ -64,7 +64,7 @@ def test_whatever_comes_the_covariance_stays_one(
             rate = 1e-4 * random.standard_normal(3) + (np.array([0.0, 0.0, spin]) if moving else 0.0)
             force = -G * np.array([np.sin(inclination), 0.0, np.cos(inclination)]) + 3e-3 * random.standard_normal(3)
             status = pair.cycle(rate, force, dt)
-            assert Status.FILTER_FAULT not in status
+            assert CycleStatus.FILTER_FAULT not in status
             pair.aid(float(random.uniform(0, 6)), age)
             pair.check()  # corrections by such impossible readings may be held, and are then counted
 
@@ -107,7 +107,7 @@ def test_holding_a_variance_keeps_the_correlations() -> None:
     P[2, :] *= 5.0
     P[:, 2] *= 5.0
     fixed = P.astype(np.int64)
-    hold(record, fixed, 2)
+    limit_variance(record, fixed, 2)
     scale, before = 1.0 / np.sqrt(np.diag(fixed)), 1.0 / np.sqrt(np.diag(P))
     np.testing.assert_allclose(fixed * np.outer(scale, scale), P * np.outer(before, before), atol=1e-12)
     assert fixed[2, 2] <= CEILING
@@ -116,9 +116,9 @@ def test_holding_a_variance_keeps_the_correlations() -> None:
 
 def test_a_variance_is_widened_to_the_end_of_its_range() -> None:
     record, P = np.zeros(1, FIXED_STATE)[0], np.zeros((STATES, STATES), np.int64)
-    widen(record, P, 2, 5)
+    widen_variance(record, P, 2, 5)
     assert (P[2, 2], record["overflows"]) == (5, 0)
-    widen(record, P, 2, CEILING)
+    widen_variance(record, P, 2, CEILING)
     assert (P[2, 2], record["overflows"]) == (CEILING, 1)
 
 
@@ -126,5 +126,5 @@ def test_a_variance_is_widened_to_the_end_of_its_range() -> None:
 def test_a_rounded_gain_leaves_the_variance_it_should(variance: float) -> None:
     state, r = np.zeros(1, FIXED_STATE)[0], 1e-12
     state["P"][2, 2] = round(variance * 2.0**VAR_Q)
-    joseph(state, innovation_var(state, 2, 1 << 31, 7, 0, round(r * 2.0**VAR_Q)))
+    joseph_update(state, innovation_var(state, 2, 1 << 31, 7, 0, round(r * 2.0**VAR_Q)))
     assert state["P"][2, 2] * 2.0**-VAR_Q == pytest.approx(r * variance / (r + variance), rel=1e-3)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node.kernels.arithmetic.formats import RATE_Q, TIME_Q, VECTOR_Q
-from node.kernels.filter.fixed.strapdown import half_turn, normalise, rotate_down, yaw_rate
+from node.kernels.filter.fixed.strapdown import half_turn, normalise_down, rotate_down, yaw_rate
 from node.kernels.filter.float64 import strapdown
 
 ONE = 2.0**VECTOR_Q
@@ -59,7 +59,7 @@ def test_ten_thousand_turns_neither_grow_nor_shrink_the_tilt(inclination: int) -
 @given(st.tuples(*[st.integers(-(2**33), 2**33)] * 3).filter(any))
 def test_any_vector_is_made_a_unit_vector(vector: tuple[int, int, int]) -> None:
     found = np.array(vector, np.int64)
-    normalise(found)
+    normalise_down(found)
     length = np.linalg.norm(np.array(vector, float))
     np.testing.assert_allclose(found / ONE, np.array(vector) / length, atol=3e-9 + 2.0 / min(length, 2**29))
 
@@ -67,5 +67,5 @@ def test_any_vector_is_made_a_unit_vector(vector: tuple[int, int, int]) -> None:
 def test_no_rate_is_no_turn_and_no_vector_points_down() -> None:
     assert half_turn(0, 0, 0, 2**29)[3:] == (0, 2**VECTOR_Q)
     nothing = np.zeros(3, np.int64)
-    normalise(nothing)
+    normalise_down(nothing)
     assert nothing.tolist() == [0, 0, 2**VECTOR_Q]

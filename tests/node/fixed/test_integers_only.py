@@ -21,9 +21,9 @@ from node.kernels.step.fixed_step import integer_aiding, integer_step
 INSPECTOR = """
 import re, sys
 import numba
-from numba.core import types
+from numba import types
 from numba.core.dispatcher import Dispatcher
-from node.kernels.arithmetic.integers import mul
+from node.kernels.arithmetic.integers import multiply_q31
 
 FLOAT = re.compile(r"\\b(double|float|half|bfloat|x86_fp80|fp128)\\b")
 
@@ -63,17 +63,19 @@ from node.kernels.record.integer_node import new_integers
 from node.kernels.step.fixed_step import integer_aiding, integer_step
 
 integers = new_integers()
-nodes, crews, own = integers["node"], integers["settings"], integers[0]
-integer_step(nodes, crews, own["parameters"], own["readings"], own["moment"])
-integer_aiding(nodes, crews, own["aiding"])
+nodes, settings, own = integers["node"], integers["settings"], integers[0]
+integer_step(nodes, settings, own["parameters"], own["readings"], own["moment"])
+integer_aiding(nodes, settings, own["aiding"])
 names = set()
 for function in functions():
     where = f"{function.__module__}.{function.__name__}"
     names.add(where)
     for found in floats_of(function):
         print(where, found)
-parts = "guard.judge_cycle cluster.fuse_imus calibration.correct make_up.make_up fixed.cycle.run_cycle "
-parts += "aligner.follow_turn realign.realign fixed.circle.finish fixed.extremes.law static_average.add_static"
+parts = "turns.guard.judge_cycle sensors.cluster.fuse_imus sensors.correction.correct_sensor string.make_up.make_up "
+parts += "filter.fixed.cycle.run_cycle sensors.aligner.follow_turn sensors.realign.realign_filter "
+parts += "sensors.integer_circle.write_circle_offset "
+parts += "sensors.integer_extremes.nonexceedance_probability sensors.static_average.add_static"
 for part in parts.split():
     assert "node.kernels." + part in names, part
 """
@@ -81,10 +83,10 @@ ONE_HALF = """
 kernel = numba.njit(error_model="numpy")
 @kernel
 def clean(x):
-    return mul(x, 1 << 30) + (x >> 1) // 3
+    return multiply_q31(x, 1 << 30) + (x >> 1) // 3
 @kernel
 def leaky(x):
-    return mul(x, 1 << 30) + int((x >> 1) * 0.5)
+    return multiply_q31(x, 1 << 30) + int((x >> 1) * 0.5)
 @kernel
 def divided(x):
     return int(x / 2)
@@ -96,8 +98,8 @@ for function in (clean, leaky, divided):
 
 FLOATS_ONLY = """
 import numba
-from node.kernels.arithmetic.angles import HALF_TURN, wrap
-from node.kernels.arithmetic.quantity import ConstantType
+from node.kernels.arithmetic.angles import HALF_TURN, wrap_angle
+from node.kernels.arithmetic.compiler import ConstantType
 
 def refuse(_):
     raise TypeError("an integer")
@@ -105,7 +107,7 @@ def refuse(_):
 ConstantType.fixed = property(refuse, lambda *_: None)
 """
 FLOAT_STEP = """
-from node.kernels.step.warm import warm_up
+from node.kernels.step.precompile import warm_up
 warm_up()
 print("all floats")
 """

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from one_node import events_since, node_of
 
-from node.firmware.alignment import rotation
+from node.firmware.alignment_orders import tube_rotation
 from node.firmware.static_record import MOVED, begin_record
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.record.node_record import READING, SATURATED
@@ -30,14 +30,14 @@ class Pair:
     def __init__(self, imus: int, lean: float = 4.0 * DEG, mount: tuple[float, float] = MOUNTS[0]) -> None:
         self.random = np.random.default_rng(imus)
         self.floats, self.fixed = node_of(imus, 0, self.random), FixedNode()
-        crew, parameters = self.floats[1][0], self.floats[2]
-        parameters["identity"], crew["noise"], crew["weight"] = 1, 1.0, 1.0
-        crew["tilt_noise"], crew["drive_angle"] = NOISE, 0.0
-        crew["place"][:3] = (0.02, 0.01), (-0.03, 0.0), (0.0, 0.05)
+        record, parameters = self.floats[1][0], self.floats[2]
+        parameters["identity"], record["noise"], record["weight"] = 1, 1.0, 1.0
+        record["tilt_noise"], record["drive_angle"] = NOISE, 0.0
+        record["place"][:3] = (0.02, 0.01), (-0.03, 0.0), (0.0, 0.05)
         self.integers = tuple(part.copy() for part in self.floats)
         angles = (mount, *MOUNTS[1:])[:imus]
         axes = [(math.sin(p), math.cos(p) * math.sin(r), math.cos(p) * math.cos(r)) for p, r in angles]
-        self.imus = [rotation(np.array(axis)).T for axis in axes]
+        self.imus = [tube_rotation(np.array(axis)).T for axis in axes]
         self.lean, self.noise, self.yaw, self.now, self.sequence = lean, NOISE, 0.3, 1000.0, 0
         self.told: list[tuple[Any, ...]] = []
         self.said = 0

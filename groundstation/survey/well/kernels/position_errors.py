@@ -36,7 +36,7 @@ def add_stations(
     passed, own : (3, s) and (3, 3), the running sums e and R; they go on with every station but the last
     first, every, marks, own_marks : the sums after the station ``first``, and after every so many from there, are put
         into (m, 3, s) and (m, 3, 3)
-    shared : (n, 3, s) m, set: columns e + e* of every position; of no rows where nobody wants them
+    shared : (n, 3, s) m, set: columns e + e* of every position; zero rows where they are not wanted
     out : (n, 3, 3) m^2, set: C of every position
     """
     mark = 0
@@ -75,7 +75,7 @@ def add_stations(
 
 
 def warm_up() -> None:
-    """Compile the loop or load it from the cache, so that nobody's first survey waits for it."""
+    """Compile the loop or load it from the cache, so that the first survey does not wait for it."""
     starts, places = np.array([0, 0, 1]), np.zeros(1, np.intp)
     add_stations(
         np.ones(1), np.ones(1), starts, places, np.zeros((2, 1)), np.zeros(1), np.zeros((2, 3, 3)), np.ones(1, np.intp),

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 from node.kernels.arithmetic.formats import STEP_Q, VECTOR_Q, Array
-from node.kernels.arithmetic.integers import inverse_root, mul, quotient, shift
+from node.kernels.arithmetic.integers import inverse_root, multiply_q31, quotient_q30, rounded_shift
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.arithmetic.trigonometry import TURN, counts, sine_cosine
+from node.kernels.arithmetic.trigonometry import TURN, radians_to_counts, sine_cosine
 
 ONE: Final = 1 << VECTOR_Q
 HALF: Final = 1 << (VECTOR_Q - 1)
@@ -24,7 +24,11 @@ def half_turn(wx: int, wy: int, wz: int, dt: int) -> tuple[int, int, int, int, i
     wx, wy, wz : rad/s, Q46, up to 32
     dt : s, Q28, up to 8
     """
-    x, y, z = shift(mul(wx, dt), HALVED), shift(mul(wy, dt), HALVED), shift(mul(wz, dt), HALVED)
+    x, y, z = (
+        rounded_shift(multiply_q31(wx, dt), HALVED),
+        rounded_shift(multiply_q31(wy, dt), HALVED),
+        rounded_shift(multiply_q31(wz, dt), HALVED),
+    )
     q = 30
     while max(abs(x), abs(y), abs(z)) >= ONE:
         x, y, z, q = x >> 1, y >> 1, z >> 1, q - 1
@@ -32,10 +36,10 @@ def half_turn(wx: int, wy: int, wz: int, dt: int) -> tuple[int, int, int, int, i
     if square == 0:
         return 0, 0, ONE, 0, ONE
     root, exponent = inverse_root(square)
-    binary = counts(shift(mul(square, root), exponent + q - 15), 45)
+    binary = radians_to_counts(rounded_shift(multiply_q31(square, root), exponent + q - 15), 45)
     sine, cosine = sine_cosine(binary & TURN)
     right = 31 + exponent
-    return shift(x * root, right), shift(y * root, right), shift(z * root, right), sine, cosine
+    return rounded_shift(x * root, right), rounded_shift(y * root, right), rounded_shift(z * root, right), sine, cosine
 
 
 @kernel
@@ -59,7 +63,7 @@ def rotate_down(down: Array, ax: int, ay: int, az: int, s: int, c: int) -> None:
 
 
 @kernel
-def normalise(down: Array) -> None:
+def normalise_down(down: Array) -> None:
     """Make ``down`` (3, below 2^30 each by a shift) a unit vector in Q30."""
     largest = max(abs(down[0]), abs(down[1]), abs(down[2]))
     while largest >= ONE:
@@ -72,11 +76,11 @@ def normalise(down: Array) -> None:
         return
     root, exponent = inverse_root(square)
     for k in range(3):
-        down[k] = shift(down[k] * root, 31 + exponent)
+        down[k] = rounded_shift(down[k] * root, 31 + exponent)
 
 
 @kernel
 def yaw_rate(down: Array, wx: int, wy: int, wz: int) -> int:
     """Psi' = wz + (wx ux + wy uy) / (1 + uz), rad/s in Q46, with ``down`` (3) in Q30."""
-    across = mul(wx, down[0] << 1) + mul(wy, down[1] << 1)
-    return wz + quotient(across, max(ONE + down[2], LEAST))
+    across = multiply_q31(wx, down[0] << 1) + multiply_q31(wy, down[1] << 1)
+    return wz + quotient_q30(across, max(ONE + down[2], LEAST))

@@ -7,18 +7,18 @@ from typing import Any
 
 from node.kernels.arithmetic.formats import Array
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.filter.float64.fixed_lag import consume, predict_to_now
+from node.kernels.filter.float64.fixed_lag import filter_due_cycles, predict_to_now
 from node.kernels.filter.modes import STATIC_BIAS, SURVEY_READY, guard_rate, is_quiet, learn_static_bias, step_modes
 from node.kernels.filter.moving_average import average_force
-from node.kernels.record.filter_record import STATES, Status
-from node.kernels.record.ring import push
+from node.kernels.record.filter_record import STATES, CycleStatus
+from node.kernels.record.ring import push_increments
 
-BAD_SAMPLE, FILTER_FAULT = int(Status.BAD_SAMPLE), int(Status.FILTER_FAULT)
+BAD_SAMPLE, FILTER_FAULT = int(CycleStatus.BAD_SAMPLE), int(CycleStatus.FILTER_FAULT)
 
 
 @kernel
 def run_cycle(state: Any, config: Any, rate: Array, force: Array, start: float, end: float, joined: int) -> int:
-    """Take one cycle's IMU reading and leave the yaw at its end in the ``now_*`` fields; returns ``Status`` bits.
+    """Take one cycle's IMU reading and leave the yaw at its end in the ``now_*`` fields; returns ``CycleStatus`` bits.
 
     Parameters
     ----------
@@ -33,10 +33,10 @@ def run_cycle(state: Any, config: Any, rate: Array, force: Array, start: float, 
             return BAD_SAMPLE
     quiet = is_quiet(state, config, rate)
     status = guard_rate(state, config, rate[2])
-    push(state, start, end, rate, force, quiet)
+    push_increments(state, start, end, rate, force, quiet)
     if state.mode == STATIC_BIAS:
         status |= learn_static_bias(state, config, rate, end - start, quiet)
-    status |= consume(state, config)
+    status |= filter_due_cycles(state, config)
     predict_to_now(state, config)
     status |= step_modes(state, config, quiet, joined, end)
     if status & SURVEY_READY:

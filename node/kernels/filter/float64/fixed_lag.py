@@ -9,26 +9,33 @@ from __future__ import annotations
 
 from typing import Any
 
-from node.kernels.arithmetic.angles import advance_binary, from_binary, to_binary, wrap
+from node.kernels.arithmetic.angles import advance_binary, from_binary, to_binary, wrap_angle
 from node.kernels.arithmetic.formats import Array
-from node.kernels.arithmetic.jit import constant, kernel
-from node.kernels.filter.covariance import COARSE, isolate, set_apart
-from node.kernels.filter.float64.propagation import propagate
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.filter.covariance import COARSE, isolate_state, set_apart
+from node.kernels.filter.float64.propagation import propagate_covariance
 from node.kernels.filter.float64.strapdown import rotate_down, yaw_rate
-from node.kernels.filter.float64.update import clear, correct, innovation_var, intersect, level, zero_rate
-from node.kernels.filter.increments import bend_at, bent_angle, faster
-from node.kernels.filter.smoothing import carry
-from node.kernels.record.filter_record import CLOCK_SLACK, INVERTED, RING, STATES, UNKNOWN_YAW_VAR, Err, Status
+from node.kernels.filter.float64.update import (
+    clear_row,
+    correct_states,
+    innovation_var,
+    intersect_covariance,
+    level_by_force,
+    zero_rate,
+)
+from node.kernels.filter.increments import bend_at, bent_angle, mean_excess_rate
+from node.kernels.filter.smoothing import propagate_survey_covariance
+from node.kernels.record.filter_record import CLOCK_SLACK, INVERTED, RING, STATES, UNKNOWN_YAW_VAR, CycleStatus, Err
 from node.kernels.record.ring import drop_first_pending, drop_repetitions, is_split, stood_still
 
-PSI, BZ, D = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.STAMP)
-AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
-LATE_DROPPED = int(Status.LATE_DROPPED)
-BX = constant(Err.BIAS_X)
+PSI, BZ, D = kernel_constant(Err.YAW), kernel_constant(Err.BIAS_Z), kernel_constant(Err.STAMP)
+AIDED, REJECTED, YAW_RESET = int(CycleStatus.AIDED), int(CycleStatus.REJECTED), int(CycleStatus.YAW_RESET)
+LATE_DROPPED = int(CycleStatus.LATE_DROPPED)
+BX = kernel_constant(Err.BIAS_X)
 
 
 @kernel
-def slope(state: Any, cycle: int) -> float:
+def spin_slope(state: Any, cycle: int) -> float:
     """Change of the spin inside ``cycle`` (rad/s^2), from its neighbours' means; 0 while one of them is missing."""
     if cycle == 0 or cycle + 1 >= state.cycles:
         return 0.0
@@ -38,22 +45,24 @@ def slope(state: Any, cycle: int) -> float:
 
 
 @kernel
-def spin(state: Any, cycle: int, begin: float, end: float) -> float:
+def mean_spin(state: Any, cycle: int, begin: float, end: float) -> float:
     """Mean spin (rad/s) from ``begin`` to ``end`` (s) inside ``cycle``: that of its parts, or linear about its mean."""
     slot = cycle % RING
     if stood_still(state, cycle):
         return 0.0
     inside = max(begin, state.ring_start[slot])  # the rest are cycles that were lost
     if is_split(state, cycle):
-        beyond = faster(state, cycle, inside, end)
+        beyond = mean_excess_rate(state, cycle, inside, end)
     else:
-        beyond = slope(state, cycle) * 0.5 * (inside + end - state.ring_start[slot] - state.ring_end[slot])
+        beyond = spin_slope(state, cycle) * 0.5 * (inside + end - state.ring_start[slot] - state.ring_end[slot])
     measured = state.ring_rate[slot, 2] + beyond
     return float((measured - state.static_bias[2] - state.bias[2]) / (1.0 + state.scale))
 
 
 @kernel
-def turn(state: Any, config: Any, cycle: int, begin: float, end: float, yaw: int, down: Array, P: Array) -> int:
+def integrate_cycle(
+    state: Any, config: Any, cycle: int, begin: float, end: float, yaw: int, down: Array, P: Array
+) -> int:
     """Integrate ``cycle`` from ``begin`` to ``end`` (s) into ``down`` and ``P``; returns the binary yaw.
 
     Still means no turn at all.
@@ -63,22 +72,22 @@ def turn(state: Any, config: Any, cycle: int, begin: float, end: float, yaw: int
     """
     slot, dt = cycle % RING, end - begin
     if stood_still(state, cycle):
-        propagate(P, 0.0, dt, 0.0, config)
+        propagate_covariance(P, 0.0, dt, 0.0, config)
         return yaw
     wx = state.ring_rate[slot, 0] - state.static_bias[0] - state.bias[0]
     wy = state.ring_rate[slot, 1] - state.static_bias[1] - state.bias[1]
-    wz = spin(state, cycle, begin, end)
+    wz = mean_spin(state, cycle, begin, end)
     rotate_down(down, wx, wy, wz, 0.5 * dt)
     turned = yaw_rate(down, wx, wy, wz) * dt
     rotate_down(down, wx, wy, wz, 0.5 * dt)
-    propagate(P, wz, dt, 1.0, config)
+    propagate_covariance(P, wz, dt, 1.0, config)
     if down[2] < INVERTED:
-        isolate(P, PSI, UNKNOWN_YAW_VAR)
+        isolate_state(P, PSI, UNKNOWN_YAW_VAR)
     return advance_binary(yaw, turned)
 
 
 @kernel
-def advance(state: Any, config: Any, cycle: int, until: float) -> None:
+def advance_epoch(state: Any, config: Any, cycle: int, until: float) -> None:
     """Move the filter's epoch to ``until`` (s), inside ``cycle`` or at its end."""
     dt = until - state.epoch
     if dt <= 0.0:
@@ -86,8 +95,8 @@ def advance(state: Any, config: Any, cycle: int, until: float) -> None:
     gap = state.ring_start[cycle % RING] - state.epoch
     if state.smoothing == 1:
         turning = 0.0 if stood_still(state, cycle) else 1.0
-        carry(state, spin(state, cycle, state.epoch, until), dt, turning, config)
-    state.yaw = turn(state, config, cycle, state.epoch, until, state.yaw, state.down, state.P)
+        propagate_survey_covariance(state, mean_spin(state, cycle, state.epoch, until), dt, turning, config)
+    state.yaw = integrate_cycle(state, config, cycle, state.epoch, until, state.yaw, state.down, state.P)
     if state.smoothing == 1 and state.down[2] < INVERTED:
         state.surveyed_with[PSI] = 0.0
     if gap > 1e-3:
@@ -113,13 +122,13 @@ def interpolation_var(state: Any, cycle: int, at: float) -> float:
     if cycle == 0:
         return 0.0
     if is_split(state, cycle):
-        curved = slope(state, cycle) * state.P[D, D]
+        curved = spin_slope(state, cycle) * state.P[D, D]
         beside = (0.25 * bend_at(state, cycle, at)) ** 2 * state.P[D, D]
         return float(bent_angle(state, cycle, at) ** 2 + beside + 0.75 * curved * curved)
     bend = 2.0 * (state.ring_rate[slot, 2] - state.ring_rate[(cycle - 1) % RING, 2])
     if cycle + 1 < state.cycles:
         bend = 0.5 * bend - (state.ring_rate[(cycle + 1) % RING, 2] - state.ring_rate[slot, 2])
-    curved = slope(state, cycle) * state.P[D, D]
+    curved = spin_slope(state, cycle) * state.P[D, D]
     return float((0.25 * bend) ** 2 * (inside * inside + state.P[D, D]) + 0.75 * curved * curved)
 
 
@@ -136,8 +145,8 @@ def reset_yaw(state: Any, config: Any, yaw: float, var: float) -> None:
 
 
 @kernel
-def aid(state: Any, config: Any, yaw: float, r_var: float, rate: float, at: float) -> int:
-    """Update with a yaw at the filter's epoch, where the spin is ``rate`` (rad/s); returns ``Status`` bits.
+def apply_aiding(state: Any, config: Any, yaw: float, r_var: float, rate: float, at: float) -> int:
+    """Update with a yaw at the filter's epoch, where the spin is ``rate`` (rad/s); returns ``CycleStatus`` bits.
 
     The epoch is that of the measurement by the present time-stamp offset, of which an error d adds rate d to z.
     r = wrap(z - psi), gated at ``config.gate`` sigmas; after ``reject_limit`` rejections in a row the filter
@@ -147,18 +156,18 @@ def aid(state: Any, config: Any, yaw: float, r_var: float, rate: float, at: floa
         reset_yaw(state, config, yaw, r_var + (rate * config.stamp_std) ** 2)
         state.last_aided = at
         return AIDED | YAW_RESET
-    clear(state.h)
+    clear_row(state.h)
     state.h[PSI] = 1.0
     if config.stamp_std > 0.0:
         state.h[D] = rate
     if config.intersection == 1:
-        weight = intersect(state.P, state.h, r_var, state.ph)
+        weight = intersect_covariance(state.P, state.h, r_var, state.ph)
         if weight == 1.0:
             state.last_aided = at
             return AIDED
         r_var /= 1.0 - weight
     s = innovation_var(state.P, state.h, r_var, state.ph)
-    residual = wrap(yaw - from_binary(state.yaw))
+    residual = wrap_angle(yaw - from_binary(state.yaw))
     state.innovation = residual
     state.innovation_var = s
     if residual * residual > config.gate * config.gate * s:
@@ -171,7 +180,7 @@ def aid(state: Any, config: Any, yaw: float, r_var: float, rate: float, at: floa
         state.stamp = 0.0
         state.last_aided = at
         return REJECTED | AIDED | YAW_RESET
-    correct(state, s, residual)
+    correct_states(state, s, residual)
     state.rejected = 0
     state.last_aided = at
     return AIDED
@@ -179,7 +188,7 @@ def aid(state: Any, config: Any, yaw: float, r_var: float, rate: float, at: floa
 
 @kernel
 def take_pending(state: Any, config: Any, cycle: int, until: float) -> int:
-    """Pass every waiting measurement valid up to ``until`` (s), oldest first; returns ``Status`` bits.
+    """Pass every waiting measurement valid up to ``until`` (s), oldest first; returns ``CycleStatus`` bits.
 
     One that the error of the clock puts just beyond ``until`` is not kept waiting: it is brought back by the spin.
     """
@@ -189,11 +198,11 @@ def take_pending(state: Any, config: Any, cycle: int, until: float) -> int:
         yaw, var = state.pending_yaw[0], state.pending_var[0]
         held = min(at, until)
         if held >= state.epoch:
-            advance(state, config, cycle, held)
+            advance_epoch(state, config, cycle, held)
             within = cycle + 1 if at > until and is_split(state, cycle + 1) else cycle
-            yaw -= spin(state, within, held, at) * (at - held)
+            yaw -= mean_spin(state, within, held, at) * (at - held)
             spread, own = interpolation_var(state, within, at), var
-            used = aid(state, config, yaw, var + spread, spin(state, cycle, held, held), at)
+            used = apply_aiding(state, config, yaw, var + spread, mean_spin(state, cycle, held, held), at)
             status |= used
             if spread > COARSE * own:
                 state.last_sequence = -1  # a repetition at rest is better timed
@@ -215,8 +224,8 @@ def aid_late(state: Any, config: Any, yaw: float, var: float, at: float) -> int:
         slot = cycle % RING
         begin = max(state.ring_start[slot], at)
         if begin < earliest:
-            moved += spin(state, cycle, begin, earliest) * (earliest - begin)
-            rate = spin(state, cycle, begin, begin)
+            moved += mean_spin(state, cycle, begin, earliest) * (earliest - begin)
+            rate = mean_spin(state, cycle, begin, begin)
             earliest = begin
         cycle -= 1
     if earliest > at + 1e-3:
@@ -225,23 +234,23 @@ def aid_late(state: Any, config: Any, yaw: float, var: float, at: float) -> int:
     lag = state.epoch - at
     var += interpolation_var(state, cycle + 1, at)
     noise = config.gyro_noise[2] ** 2 * lag + state.P[BZ, BZ] * lag * lag
-    return aid(state, config, moved, var + noise, rate, at)
+    return apply_aiding(state, config, moved, var + noise, rate, at)
 
 
 @kernel
-def consume(state: Any, config: Any) -> int:
-    """Filter every cycle that is old enough; returns ``Status`` bits."""
+def filter_due_cycles(state: Any, config: Any) -> int:
+    """Filter every cycle that is old enough; returns ``CycleStatus`` bits."""
     status = 0
     while state.consumed < state.cycles - config.lag_cycles:
         cycle = state.consumed
         slot = cycle % RING
         end = state.ring_end[slot]
         status |= take_pending(state, config, cycle, end)
-        advance(state, config, cycle, end)
+        advance_epoch(state, config, cycle, end)
         if stood_still(state, cycle):
             dt = end - state.ring_start[slot]
             zero_rate(state, state.ring_rate[slot], dt, config)
-            level(state, state.ring_force[slot], config)
+            level_by_force(state, state.ring_force[slot], config)
         state.consumed += 1
     return status
 
@@ -260,7 +269,9 @@ def predict_to_now(state: Any, config: Any) -> None:
         slot = cycle % RING
         end = state.ring_end[slot]
         if end > state.now:
-            state.now_yaw = turn(state, config, cycle, state.now, end, state.now_yaw, state.now_down, state.now_P)
+            state.now_yaw = integrate_cycle(
+                state, config, cycle, state.now, end, state.now_yaw, state.now_down, state.now_P
+            )
             state.now = end
     newest = (state.cycles - 1) % RING
     state.now_rate = (state.ring_rate[newest, 2] - state.static_bias[2] - state.bias[2]) / (1.0 + state.scale)

@@ -9,16 +9,16 @@ import math
 from typing import Any
 
 from node.kernels.arithmetic.formats import Array
-from node.kernels.arithmetic.jit import constant, kernel
+from node.kernels.arithmetic.jit import kernel, kernel_constant
 from node.kernels.record.filter_record import STATES, Err
 
-TX, TY, PSI = constant(Err.TILT_X), constant(Err.TILT_Y), constant(Err.YAW)
-BX, BY, BZ = constant(Err.BIAS_X), constant(Err.BIAS_Y), constant(Err.BIAS_Z)
-S, D = constant(Err.SCALE), constant(Err.STAMP)
+TX, TY, PSI = kernel_constant(Err.TILT_X), kernel_constant(Err.TILT_Y), kernel_constant(Err.YAW)
+BX, BY, BZ = kernel_constant(Err.BIAS_X), kernel_constant(Err.BIAS_Y), kernel_constant(Err.BIAS_Z)
+S, D = kernel_constant(Err.SCALE), kernel_constant(Err.STAMP)
 
 
 @kernel
-def propagate(P: Array, wz: float, dt: float, turning: float, config: Any) -> None:
+def propagate_covariance(P: Array, wz: float, dt: float, turning: float, config: Any) -> None:
     """Covariance ``P`` (8, 8) in place over ``dt`` (s) at the spin ``wz`` (rad/s).
 
     ``turning`` is 1 while the gyroscope is integrated and 0 while still, when the rates are zero by knowledge.
@@ -45,7 +45,7 @@ def propagate(P: Array, wz: float, dt: float, turning: float, config: Any) -> No
         P[i, BY] *= fy
         P[i, BZ] *= fz
     add_process_noise(P, dt, turning, fx, fy, fz, config)
-    symmetrise(P)
+    symmetrise_covariance(P)
 
 
 @kernel
@@ -65,7 +65,7 @@ def add_process_noise(P: Array, dt: float, turning: float, fx: float, fy: float,
 
 
 @kernel
-def symmetrise(P: Array) -> None:
+def symmetrise_covariance(P: Array) -> None:
     """Make ``P`` (8, 8) symmetric to the last bit."""
     for i in range(STATES):
         for j in range(i):

@@ -11,12 +11,12 @@ from typing import Any
 
 from node.kernels.arithmetic.angles import advance_binary
 from node.kernels.arithmetic.formats import Array
-from node.kernels.arithmetic.jit import constant, kernel
+from node.kernels.arithmetic.jit import kernel, kernel_constant
 from node.kernels.filter.smoothing import look_back
 from node.kernels.record.filter_record import STATES, Err
 
-TX, TY, PSI = constant(Err.TILT_X), constant(Err.TILT_Y), constant(Err.YAW)
-BX, S, D = constant(Err.BIAS_X), constant(Err.SCALE), constant(Err.STAMP)
+TX, TY, PSI = kernel_constant(Err.TILT_X), kernel_constant(Err.TILT_Y), kernel_constant(Err.YAW)
+BX, S, D = kernel_constant(Err.BIAS_X), kernel_constant(Err.SCALE), kernel_constant(Err.STAMP)
 
 
 @kernel
@@ -34,7 +34,7 @@ def innovation_var(P: Array, h: Array, r_var: float, ph: Array) -> float:
 
 
 @kernel
-def joseph(P: Array, ph: Array, s: float, gain: Array) -> None:
+def joseph_update(P: Array, ph: Array, s: float, gain: Array) -> None:
     """Covariance after the update with K = P H^T / S; leaves K in ``gain`` (8)."""
     for i in range(STATES):
         gain[i] = ph[i] / s
@@ -46,7 +46,7 @@ def joseph(P: Array, ph: Array, s: float, gain: Array) -> None:
 
 
 @kernel
-def intersect(P: Array, h: Array, r_var: float, ph: Array) -> float:
+def intersect_covariance(P: Array, h: Array, r_var: float, ph: Array) -> float:
     """Covariance intersection with a scalar measurement: the weight w of the node's own estimate, at most 1.
 
     P becomes P / w, R is to become R / (1 - w), whatever the correlation of the two. The w with the least determinant
@@ -81,16 +81,16 @@ def feed_back(state: Any, residual: float) -> None:
 
 
 @kernel
-def correct(state: Any, s: float, residual: float) -> None:
+def correct_states(state: Any, s: float, residual: float) -> None:
     """Update by a ``residual`` of the variance ``s``, whose H and P H^T are in the record: filter and last survey."""
-    joseph(state.P, state.ph, s, state.gain)
+    joseph_update(state.P, state.ph, s, state.gain)
     if state.smoothing == 1:
         look_back(state, s, residual)
     feed_back(state, residual)
 
 
 @kernel
-def clear(h: Array) -> None:
+def clear_row(h: Array) -> None:
     """Zero the measurement row."""
     for i in range(STATES):
         h[i] = 0.0
@@ -100,19 +100,19 @@ def clear(h: Array) -> None:
 def zero_rate(state: Any, rate: Array, dt: float, config: Any) -> None:
     """Zero-angular-rate update: while still the mean rate over ``dt`` (s) is the bias, axis by axis."""
     for k in range(3):
-        clear(state.h)
+        clear_row(state.h)
         state.h[BX + k] = 1.0
         noise = config.attitude_factor * config.gyro_noise[k]
         s = innovation_var(state.P, state.h, noise * noise / dt, state.ph)
-        correct(state, s, rate[k] - state.static_bias[k] - state.bias[k])
+        correct_states(state, s, rate[k] - state.static_bias[k] - state.bias[k])
 
 
 @kernel
-def level(state: Any, force: Array, config: Any) -> None:
+def level_by_force(state: Any, force: Array, config: Any) -> None:
     """Correct gravity's direction from the specific force at rest: f / g = -u, u_true = u + u x e."""
     r_var = (config.force_std / config.gravity) ** 2
     for k in range(3):
-        clear(state.h)
+        clear_row(state.h)
         if k == 0:
             state.h[TY] = state.down[2]
         elif k == 1:
@@ -121,4 +121,4 @@ def level(state: Any, force: Array, config: Any) -> None:
             state.h[TY] = -state.down[0]
             state.h[TX] = state.down[1]
         s = innovation_var(state.P, state.h, r_var, state.ph)
-        correct(state, s, force[k] / config.gravity + state.down[k])
+        correct_states(state, s, force[k] / config.gravity + state.down[k])

@@ -86,7 +86,7 @@ export function showOrders(orders) {
   });
 }
 
-/** The tubes that may be told to survey, the lowest chosen unless somebody chose another. */
+/** The tubes that may be told to survey, the lowest chosen until the user chooses another. */
 export function showTubes(picture) {
   const tubes = (picture.answers.string?.tubes ?? []).map((row) => String(row.tube)).reverse();
   const select = byId("tube");

@@ -1,9 +1,9 @@
-// Who is signed in, and orders in that name. Whoever orders without a role is asked for it first, once.
+// The signed-in role and its orders. An order without a role first asks for one, once.
 
 import { byId, element, write } from "./dom.js";
 
 let session = { orders: false, roles: [], csrf: null };
-let then = null; // what is to be done once somebody has signed in
+let then = null; // what is to be done after the next sign-in
 
 /** Ask who is signed in; where not even reading is open, ask for a role at once. */
 export async function readSession() {
@@ -30,7 +30,7 @@ export async function order(name, parameters, told) {
   }
 }
 
-/** Connect the buttons of the dialog; `changed` is called when somebody has signed in or out. */
+/** Connect the buttons of the dialog; `changed` is called after a sign-in or sign-out. */
 export function connectSession(changed) {
   byId("sign").addEventListener("click", async () => {
     if (session.role) {
@@ -59,7 +59,7 @@ export function connectSession(changed) {
 }
 
 function openDialog() {
-  write(byId("sign-error"), session.roles.length ? "" : "nobody can sign in: the ground station has no passwords");
+  write(byId("sign-error"), session.roles.length ? "" : "sign-in is off: the ground station has no passwords");
   byId("sign-now").disabled = !session.roles.length;
   byId("role").replaceChildren(...session.roles.map((role) => element("option", { value: role }, role)));
   byId("sign-in").showModal();

@@ -4,7 +4,7 @@ import { byId, shown, write } from "./dom.js";
 
 const WORDS = { on_target: "ON TARGET", watch: "WATCH", steer: "STEER", out: "OUT", dont_know: "DON'T KNOW" };
 
-/** Show the verdict of this moment; that of a replay never has a colour on which somebody might count. */
+/** Show the verdict of this moment; that of a replay has no colour, lest it be taken for the present one. */
 export function showVerdict(picture, now, { replay }) {
   const found = (replay && picture.answers.verdict) || picture.verdict(now);
   const section = byId("verdict");

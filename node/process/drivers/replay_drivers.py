@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from node.errors import SensorError
 from node.firmware.edge_interpolation import EDGES
-from node.firmware.encoder import EncoderSample
+from node.firmware.encoder_node import EncoderSample
 from node.kernels.sensors.correction import USUAL
 from node.process.drivers.source import ImuSample
 

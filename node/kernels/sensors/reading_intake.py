@@ -11,7 +11,7 @@ from node.kernels.filter.resets import open_yaw
 from node.kernels.record.node_record import FX, LATE, LATE_STD, SATURATED, TEMPERATURE, WX
 from node.kernels.sensors.alignment import to_tube
 from node.kernels.sensors.cluster import fuse_imus
-from node.kernels.sensors.correction import calibrate
+from node.kernels.sensors.correction import correct_cycle
 from node.kernels.sensors.delay import date_window, make_up_delay
 from node.kernels.sensors.parts import read_parts, split_cycle
 
@@ -71,7 +71,7 @@ def correct_reading(node: Any, parameters: Array, readings: Array, imu: int) -> 
     own = parameters[1 + imu]
     node.temperature = readings[imu, TEMPERATURE]
     if own.identity != 1:
-        calibrate(own, node.temperature, readings[imu, WX : WX + 3], readings[imu, FX : FX + 3])
+        correct_cycle(own, node.temperature, readings[imu, WX : WX + 3], readings[imu, FX : FX + 3])
     for k in range(3):
         node.raw_rate[k], node.raw_force[k] = readings[imu, WX + k], readings[imu, FX + k]
 
@@ -81,7 +81,7 @@ def correct_one(node: Any, parameters: Array, imu: int, temperature: float, rate
     """Correct the rate and force of one IMU by the block in use, and turn them into the tube's frame."""
     if not are_numbers(rate, force):
         return
-    calibrate(parameters[0], temperature, rate, force)
+    correct_cycle(parameters[0], temperature, rate, force)
     for k in range(3):
         node.unaligned[imu, k] = force[k]
     axis = node.mount.axis[imu]

@@ -44,7 +44,7 @@ def alignment_in_use(mount: Any, imus: int) -> dict[str, Value]:
     }
 
 
-def rotation(axis: Array) -> Array:
+def tube_rotation(axis: Array) -> Array:
     """Matrix (3, 3) of ``to_tube``; the axis need not be of unit length."""
     unit, columns = axis / np.linalg.norm(axis), np.eye(3)
     for column in columns:

@@ -7,17 +7,28 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from node.errors import NodeConfigurationError
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.kernel_choice import kernel_of
-from node.firmware.settings import TubeSettings
+from node.firmware.kernel_choice import LOOPS, added_loop, kernel_of
 from node.firmware.tube import Tube
+from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import DEG, PERIOD, Array
 from node.kernels.filter.float64.propagation import BX, PSI, TX, TY
-from node.kernels.published import cycle as published
-from node.kernels.published.euler import error_rates, euler_rates, geometry_of, point_down, propagate, tilt_of
-from node.kernels.published.step import published_aiding, published_step
-from node.kernels.record.filter_record import STATES, Err, Status, default_config, new_state
+from node.kernels.record.filter_record import STATES, CycleStatus, Err, default_config, new_state
 from node.kernels.record.node_record import new_node
+from sim.errors import ScenarioError
+from sim.studies.lab import LAB, run_seed
+from sim.studies.published_form import feed_forward as published
+from sim.studies.published_form.euler_angles import (
+    error_rates,
+    euler_rates,
+    geometry_of,
+    point_down,
+    propagate_covariance,
+    tilt_of,
+)
+from sim.studies.published_form.published_forms import KERNEL, setup_of
+from sim.studies.published_form.published_step import published_aiding, published_loop, published_step
 from telemetry.messages import Aiding, Event, NodeFlag, NodeState
 
 G = 9.81
@@ -34,9 +45,9 @@ class Node:
         self.force = -G * np.array([-math.sin(tilt), 0.0, math.cos(tilt)])
         self.now, self.sequence = 1000.0, 0
 
-    def cycle(self, rate: tuple[float, float, float] = (0.0, 0.0, 0.0), dt: float = PERIOD) -> Status:
+    def cycle(self, rate: tuple[float, float, float] = (0.0, 0.0, 0.0), dt: float = PERIOD) -> CycleStatus:
         start, self.now = self.now, self.now + dt
-        return Status(published.run_cycle(self.state, self.config, np.array(rate), self.force, start, self.now, 1))
+        return CycleStatus(published.run_cycle(self.state, self.config, np.array(rate), self.force, start, self.now, 1))
 
     def aid(self, yaw: float, age: float = 0.0, var: float = (0.003 * DEG) ** 2) -> None:
         self.sequence += 1
@@ -102,7 +113,7 @@ def test_the_propagation_is_that_of_the_matrices() -> None:
     noise[:3, :3] = by_rates @ np.diag(walk) @ by_rates.T
     noise[3:, 3:] = np.diag(drive)
     expected = F @ P[:6, :6] @ F.T + noise
-    propagate(P, dt, geometry_of(angles[0], angles[1], w[1], w[2]), config)
+    propagate_covariance(P, dt, geometry_of(angles[0], angles[1], w[1], w[2]), config)
     np.testing.assert_allclose(P[:6, :6], expected, rtol=1e-12)
     assert (P[6:, :6] == 0.0).all()
     assert (np.diag(P)[6:] == 1.0).all()
@@ -151,13 +162,9 @@ def test_an_aiding_is_moved_from_its_time_of_validity(age: float) -> None:
 
 def tube(tilt: float) -> tuple[Tube, Array]:
     config = default_config()
-    node = Tube(
-        TubeSettings(1, state_every=1, kernel="published"),
-        config,
-        new_node(config),
-        iter(range(10**6)).__next__,
-        restored=False,
-    )
+    with added_loop(KERNEL, published_loop):
+        settings = TubeSettings(1, state_every=1, kernel=KERNEL)
+        node = Tube(settings, config, new_node(config), iter(range(10**6)).__next__, restored=False)
     return node, -G * np.array([-math.sin(tilt), 0.0, math.cos(tilt)])
 
 
@@ -220,7 +227,7 @@ def test_whatever_comes_a_cycle_ends_with_numbers_or_says_so(
             node.aid(float(random.uniform(0.0, math.tau)), age)
             P = node.state["now_P"]
             sound = np.isfinite(P).all() and (np.diag(P) >= 0.0).all()
-            assert sound or Status.FILTER_FAULT in status
+            assert sound or CycleStatus.FILTER_FAULT in status
             assert np.isfinite([*node.state["now_down"], *node.state["bias"], node.state["now_rate"]]).all()
             assert np.array_equal(P, P.T)
 
@@ -233,7 +240,7 @@ def test_a_repetition_at_rest_counts_again() -> None:
         node.cycle()
         node.aid(1.0)
         node.sequence -= 1
-        found.append(Status.AIDED in node.cycle())
+        found.append(CycleStatus.AIDED in node.cycle())
     assert all(found)
 
 
@@ -241,12 +248,12 @@ def test_a_reading_that_is_no_number_changes_nothing() -> None:
     node = Node()
     node.learn()
     before = node.state.tobytes()
-    assert node.cycle((0.0, math.nan, 0.0)) == Status.BAD_SAMPLE
+    assert node.cycle((0.0, math.nan, 0.0)) == CycleStatus.BAD_SAMPLE
     assert node.state.tobytes() == before
 
 
 def test_a_restart_goes_on_from_the_output() -> None:
-    from node.kernels.filter.resets import resume
+    from node.kernels.filter.resets import resume_filter
 
     config = default_config()
     states = new_state(config)
@@ -257,7 +264,7 @@ def test_a_restart_goes_on_from_the_output() -> None:
         node.cycle((1e-4, 1e-4, 1e-4))
         node.aid(1.0)
     yaw = node.yaw
-    resume(states[0])
+    resume_filter(states[0])
     node.cycle()
     assert node.yaw == pytest.approx(yaw, abs=0.01 * DEG)
     assert node.state["P"][TX, TX] < 1.0
@@ -278,10 +285,24 @@ def test_six_states_are_estimated_and_the_other_two_stay_as_they_began() -> None
     assert P[BX, BX] != prior[BX, BX]
 
 
-def test_it_is_chosen_by_the_settings() -> None:
-    assert kernel_of("published") == (
-        published.run_cycle,
-        published.offer_aiding,
-        published_step,
-        published_aiding,
-    )
+def test_it_is_chosen_by_the_settings_while_a_study_offers_it() -> None:
+    ours = dict(LOOPS)
+    with added_loop(KERNEL, published_loop):
+        assert kernel_of(KERNEL) == (published.run_cycle, published.offer_aiding, published_step, published_aiding)
+        assert TubeSettings(1, kernel=KERNEL).kernel == KERNEL
+    assert ours == LOOPS
+    with pytest.raises(NodeConfigurationError, match="kernel: expected one of float64, fixed, got published"):
+        TubeSettings(1, kernel=KERNEL)
+
+
+@pytest.mark.parametrize("name", ["float64", "fixed", KERNEL])
+def test_no_study_takes_the_name_of_a_kernel(name: str) -> None:
+    ours = dict(LOOPS)
+    with added_loop(KERNEL, published_loop), pytest.raises(NodeConfigurationError, match=f"another name .*got {name}"):
+        added_loop(name, published_loop).__enter__()
+    assert ours == LOOPS
+
+
+def test_a_scenario_of_the_published_form_is_refused_outside_its_study() -> None:
+    with pytest.raises(ScenarioError, match=r"node\.kernel: expected one of float64, fixed, got 'published'"):
+        run_seed((setup_of(LAB, "published filter"), 1))

@@ -14,41 +14,43 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.arithmetic.formats import ANGLE_Q, DEG, VECTOR_Q
-from node.kernels.arithmetic.jit import constant, kernel
+from node.kernels.arithmetic.jit import kernel, kernel_constant
 from node.kernels.arithmetic.operations import (
-    held,
+    angular_product,
+    angular_root,
+    angular_square,
+    as_number,
+    bounded_variance,
     is_number,
-    lasting,
-    mean,
-    number,
-    product,
-    ratio,
-    root,
-    square,
-    times,
-    turn,
+    mean_of_total,
+    quantity_ratio,
+    time_of_cycles,
+    times_factor,
+    turned_angle,
 )
-from node.kernels.arithmetic.quantity import NONE, factor, variance
-from node.kernels.record.events import Code, tell, told, told_degrees
+from node.kernels.arithmetic.quantity import NONE, factor_quantity, variance_quantity
+from node.kernels.record.events import Code, event_degrees, event_number, queue_event
 from node.kernels.turns.swings import swing_var
 
 MEMORY: Final = 32  # aidings over which the misfit is averaged
-DOUBTED: Final = factor(
+DOUBTED: Final = factor_quantity(
     2.0
 )  # mean of innovation^2 / variance, from where it is a misfit; of honest noise once in 10^5 hours
-CLEARED: Final = factor(1.5)  # likewise, below which it is none any more
-ALIKE: Final = factor(0.7)  # mean of the products of neighbours over the variance, from where they hang together
-UNLIKE: Final = factor(0.3)  # likewise, below which they do not any more
+CLEARED: Final = factor_quantity(1.5)  # likewise, below which it is none any more
+ALIKE: Final = factor_quantity(
+    0.7
+)  # mean of the products of neighbours over the variance, from where they hang together
+UNLIKE: Final = factor_quantity(0.3)  # likewise, below which they do not any more
 MOST: Final = 9  # variances, that one innovation counts for: outliers and faults are for the gate
 SURE: Final = 5  # sigmas, from where what a gyroscope cannot explain is a jump
 UNSURE_CYCLES: Final = 2  # in which it may have been wrong before it contradicted, or turned otherwise than last
 SETTLED: Final = 9  # variances, within which two jumps cancel each other
-LEAST: Final = factor(0.01)  # of a variance, that is left of it without the misfit
-LARGEST_MISFIT: Final = variance((5.0 * DEG) ** 2)  # rad^2
-LARGEST_NOISE: Final = variance((0.1 * DEG) ** 2)  # rad^2, of it in the variance of an aiding
-AIDING_DOUBTED = constant(Code.AIDING_DOUBTED)
+LEAST: Final = factor_quantity(0.01)  # of a variance, that is left of it without the misfit
+LARGEST_MISFIT: Final = variance_quantity((5.0 * DEG) ** 2)  # rad^2
+LARGEST_NOISE: Final = variance_quantity((0.1 * DEG) ** 2)  # rad^2, of it in the variance of an aiding
+AIDING_DOUBTED = kernel_constant(Code.AIDING_DOUBTED)
 
 
 @kernel
@@ -57,7 +59,7 @@ def misfit_var(node: Any) -> float:
     guard = node.guard
     shown = max(guard.excess, guard.shared) if guard.doubted == 1 else 0
     swung = swing_var(node) if guard.rate != 0 else 0
-    return number(min(max(shown, swung), LARGEST_MISFIT))
+    return as_number(min(max(shown, swung), LARGEST_MISFIT))
 
 
 @kernel
@@ -69,7 +71,9 @@ def noise_var(node: Any) -> float:
 @kernel
 def unexplained_var(node: Any) -> float:
     """Variance (rad^2) of the yaw that no filter averages away: of misfit, ramps, the jump, of a late window."""
-    return held(misfit_var(node) + node.guard.ramp.doubt + square(node.guard.jump) + window_var(node))
+    return bounded_variance(
+        misfit_var(node) + node.guard.ramp.doubt + angular_square(node.guard.jump) + window_var(node)
+    )
 
 
 @kernel
@@ -82,13 +86,17 @@ def is_dated(node: Any) -> bool:
 @kernel
 def window_var(node: Any) -> float:
     """Variance (rad^2) of the yaw while the head turns, by what that date may be off."""
-    return square(turn(node.guard.rate, node.cluster.delayed[0].std)) if is_dated(node) else 0
+    return angular_square(turned_angle(node.guard.rate, node.cluster.delayed[0].std)) if is_dated(node) else 0
 
 
 @kernel
 def passing_var(node: Any) -> float:
     """Variance (rad^2) of an aiding by that part of it which is another one in every window."""
-    return window_var(node) - square(turn(node.guard.rate, node.cluster.delayed[0].lasting)) if is_dated(node) else 0
+    return (
+        window_var(node) - angular_square(turned_angle(node.guard.rate, node.cluster.delayed[0].lasting))
+        if is_dated(node)
+        else 0
+    )
 
 
 @kernel
@@ -102,18 +110,18 @@ def follow_misfit(node: Any) -> None:
     whole = state.innovation_var
     if not whole > 0:
         return
-    plain = max(whole - noise_var(node), times(whole, LEAST))
-    own = min(square(state.innovation), MOST * whole)
-    guard.misfit += mean(ratio(own, plain) - guard.misfit, MEMORY)
-    guard.excess = max(guard.excess + mean(own - plain - guard.excess, MEMORY), 0)
-    common = max(min(product(state.innovation, guard.before), MOST * whole), -MOST * whole)
-    guard.likeness += mean(ratio(common, plain) - guard.likeness, MEMORY)
-    guard.shared = max(guard.shared + mean(common - guard.shared, MEMORY), 0)
+    plain = max(whole - noise_var(node), times_factor(whole, LEAST))
+    own = min(angular_square(state.innovation), MOST * whole)
+    guard.misfit += mean_of_total(quantity_ratio(own, plain) - guard.misfit, MEMORY)
+    guard.excess = max(guard.excess + mean_of_total(own - plain - guard.excess, MEMORY), 0)
+    common = max(min(angular_product(state.innovation, guard.before), MOST * whole), -MOST * whole)
+    guard.likeness += mean_of_total(quantity_ratio(common, plain) - guard.likeness, MEMORY)
+    guard.shared = max(guard.shared + mean_of_total(common - guard.shared, MEMORY), 0)
     guard.before = state.innovation
     if guard.doubted == 0 and (guard.misfit > DOUBTED or guard.likeness > ALIKE):
         guard.doubted = 1
-        sigma = told_degrees(root(misfit_var(node)), ANGLE_Q)
-        tell(node, AIDING_DOUBTED, told(guard.misfit, VECTOR_Q), sigma, NONE, NONE)
+        sigma = event_degrees(angular_root(misfit_var(node)), ANGLE_Q)
+        queue_event(node, AIDING_DOUBTED, event_number(guard.misfit, VECTOR_Q), sigma, NONE, NONE)
     elif guard.doubted == 1 and guard.misfit < CLEARED and guard.likeness < UNLIKE:
         guard.doubted = 0
 
@@ -126,10 +134,12 @@ def follow_jump(node: Any) -> None:
     """
     state, guard, before = node.filter, node.guard, node.guard.jump
     guard.last_jump = state.innovation
-    guard.jump = wrap(guard.jump + state.innovation)
-    if square(guard.jump) < SETTLED * state.innovation_var:
+    guard.jump = wrap_angle(guard.jump + state.innovation)
+    if angular_square(guard.jump) < SETTLED * state.innovation_var:
         guard.jump = 0
-    state.systematic_var = held(max(state.systematic_var + square(guard.jump) - square(before), 0))
+    state.systematic_var = bounded_variance(
+        max(state.systematic_var + angular_square(guard.jump) - angular_square(before), 0)
+    )
 
 
 @kernel
@@ -141,11 +151,13 @@ def keep_contradiction(node: Any) -> None:
     state, guard = node.filter, node.guard
     if state.rejected == 0 or guard.rest_cycles < state.rejected:
         return
-    turned = turn(state.now_rate, lasting(state.now, state.rejected))
-    unsure = abs(turn(state.now_rate, lasting(state.now, UNSURE_CYCLES))) + SURE * root(state.innovation_var)
-    jump = wrap(state.innovation + turned)
+    turned = turned_angle(state.now_rate, time_of_cycles(state.now, state.rejected))
+    unsure = abs(turned_angle(state.now_rate, time_of_cycles(state.now, UNSURE_CYCLES))) + SURE * angular_root(
+        state.innovation_var
+    )
+    jump = wrap_angle(state.innovation + turned)
     if abs(jump) > unsure:
-        guard.jump = wrap(guard.jump + jump)
+        guard.jump = wrap_angle(guard.jump + jump)
 
 
 @kernel
@@ -153,5 +165,5 @@ def explain_jump(node: Any) -> None:
     """The last reset was the gyroscope's doing: what the yaw jumped by is no longer in doubt."""
     guard = node.guard
     if guard.last_jump != 0:
-        guard.jump = wrap(guard.jump - guard.last_jump) if guard.jump != 0 else 0
+        guard.jump = wrap_angle(guard.jump - guard.last_jump) if guard.jump != 0 else 0
         guard.last_jump = 0

@@ -8,8 +8,9 @@ from typing import Final, Literal, TypeAlias, get_args
 
 import numpy as np
 
-from node.errors import ConfigurationError
+from node.errors import NodeConfigurationError
 from node.firmware.imu_settings import ImuSettings
+from node.firmware.kernel_choice import LOOPS
 from node.firmware.sensor_limits import USUAL_LIMITS, SensorLimits
 from node.kernels.arithmetic.formats import DEG, Array
 from node.kernels.record.filter_record import Scheme
@@ -17,7 +18,7 @@ from node.kernels.record.node_record import SETTINGS
 from node.kernels.record.sensor_record import MAX_IMUS
 from telemetry.messages import MAX_TUBE
 
-Kernel: TypeAlias = Literal["float64", "fixed", "published"]
+Kernel: TypeAlias = Literal["float64", "fixed"]
 KERNELS: Final = get_args(Kernel)
 TorsionRule: TypeAlias = Literal["gate", "variance"]
 MAX_REACH: Final = 8  # tubes away
@@ -25,7 +26,7 @@ JointRule: TypeAlias = Literal["marks", "solved", "both"]
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
+class MakeUpAngle:
     """A make-up angle as read from the scribe marks: yaw of the lower part minus yaw of the upper part."""
 
     angle: float = 0.0  # rad
@@ -36,8 +37,8 @@ class Joint:
 class PassedTube:
     """The joints of a tube above, for the time when it is silent and the one beyond it is heard."""
 
-    drive_joint: Joint = Joint()
-    lower_joint: Joint = Joint()
+    drive_joint: MakeUpAngle = MakeUpAngle()
+    lower_joint: MakeUpAngle = MakeUpAngle()
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +46,13 @@ class TubeSettings:
     """What the crew knows of a tube when it is powered on."""
 
     tube: int
-    drive_joint: Joint = Joint()  # to the drive head, while this is the top tube
-    lower_joint: Joint = Joint()  # to the tube below
+    drive_joint: MakeUpAngle = MakeUpAngle()  # to the drive head, while this is the top tube
+    lower_joint: MakeUpAngle = MakeUpAngle()  # to the tube below
     mount_std: float = 0.0  # rad, IMU against the tube's marks, about the tube axis
     scheme: Scheme = Scheme.FORWARD
     state_every: int = 2  # cycles from one report to the next
     aiding_old_after: float = 3.0  # s
-    kernel: Kernel = "float64"  # of the loop; fixed is for a controller without floats, published for experiments
+    kernel: str = "float64"  # of the loop, see ``LOOPS``; fixed is for a controller without floats
     limits: SensorLimits = USUAL_LIMITS  # of its IMU
     stiffness: float = math.inf  # N m/rad, G J / L of this tube; infinite: rigid
     torsion: TorsionRule = "gate"  # aiding under torque: not used, or used with the variance of the twist
@@ -69,64 +70,70 @@ class TubeSettings:
         ConfigurationError
             With the field, its range and what was given.
         """
-        require(1 <= self.tube <= MAX_TUBE, f"tube: expected 1..{MAX_TUBE}, got {self.tube}")
-        require(self.state_every >= 1, f"state_every: expected at least 1 cycle, got {self.state_every}")
-        require(1 <= self.reach <= MAX_REACH, f"reach: expected 1..{MAX_REACH} tubes, got {self.reach}")
+        require_setting(1 <= self.tube <= MAX_TUBE, f"tube: expected 1..{MAX_TUBE}, got {self.tube}")
+        require_setting(self.state_every >= 1, f"state_every: expected at least 1 cycle, got {self.state_every}")
+        require_setting(1 <= self.reach <= MAX_REACH, f"reach: expected 1..{MAX_REACH} tubes, got {self.reach}")
         age = self.aiding_old_after
-        require(math.isfinite(age) and age > 0.0, f"aiding_old_after: expected a time in s, got {age}")
+        require_setting(math.isfinite(age) and age > 0.0, f"aiding_old_after: expected a time in s, got {age}")
         count = len(self.imus)
-        require(1 <= count <= MAX_IMUS, f"imus: expected 1..{MAX_IMUS} IMUs, got {count}")
-        require(self.kernel in KERNELS, f"kernel: expected one of {', '.join(KERNELS)}, got {self.kernel}")
+        require_setting(1 <= count <= MAX_IMUS, f"imus: expected 1..{MAX_IMUS} IMUs, got {count}")
+        require_setting(self.kernel in LOOPS, f"kernel: expected one of {', '.join(LOOPS)}, got {self.kernel}")
         alone = self.kernel != "float64" and self.scheme is Scheme.INTERSECTION
-        require(not alone, f"scheme: expected forward or estimate with the kernel {self.kernel}, got intersection")
-        require(self.stiffness > 0.0, f"stiffness: expected more than 0 N m/rad, got {self.stiffness}")
+        require_setting(
+            not alone, f"scheme: expected forward or estimate with the kernel {self.kernel}, got intersection"
+        )
+        require_setting(self.stiffness > 0.0, f"stiffness: expected more than 0 N m/rad, got {self.stiffness}")
         for name, rule, rules in (
             ("torsion", self.torsion, get_args(TorsionRule)),
             ("joints", self.joints, get_args(JointRule)),
         ):
-            require(rule in rules, f"{name}: expected one of {', '.join(rules)}, got {rule}")
+            require_setting(rule in rules, f"{name}: expected one of {', '.join(rules)}, got {rule}")
         solvable = self.joints == "marks" or self.scheme is Scheme.FORWARD
-        require(solvable, f"joints: expected marks with a scheme other than forward, got {self.joints}")
+        require_setting(solvable, f"joints: expected marks with a scheme other than forward, got {self.joints}")
         for name, std in (
             ("drive_joint.std", self.drive_joint.std),
             ("lower_joint.std", self.lower_joint.std),
             ("mount_std", self.mount_std),
             ("unseen_std", self.unseen_std),
         ):
-            require(math.isfinite(std) and std >= 0.0, f"{name}: expected a standard deviation in rad, got {std}")
+            require_setting(
+                math.isfinite(std) and std >= 0.0, f"{name}: expected a standard deviation in rad, got {std}"
+            )
         for name, angle in (
             ("drive_joint.angle", self.drive_joint.angle),
             ("lower_joint.angle", self.lower_joint.angle),
         ):
-            require(math.isfinite(angle), f"{name}: expected an angle in rad, got {angle}")
+            require_setting(math.isfinite(angle), f"{name}: expected an angle in rad, got {angle}")
 
 
-def require(condition: bool, message: str) -> None:
-    """Raise ``ConfigurationError`` with ``message`` unless ``condition``."""
+def require_setting(condition: bool, message: str) -> None:
+    """Raise ``NodeConfigurationError`` with ``message`` unless ``condition``."""
     if not condition:
-        raise ConfigurationError(message)
+        raise NodeConfigurationError(message)
 
 
-def crew_record(settings: TubeSettings, configs: Array) -> Array:
+def settings_record(settings: TubeSettings, configs: Array) -> Array:
     """Settings as the step reads them, one record of dtype ``SETTINGS``; ``configs`` is the node's configuration."""
     made = np.zeros(1, SETTINGS)
-    crew, limits = made[0], settings.limits
-    crew["drive_angle"], crew["drive_var"] = settings.drive_joint.angle, settings.drive_joint.std**2
-    crew["lower_angle"], crew["lower_var"] = settings.lower_joint.angle, settings.lower_joint.std**2
-    crew["unseen_var"] = settings.unseen_std**2
-    crew["scheme"], crew["state_every"] = int(settings.scheme), settings.state_every
-    crew["torsion_gate"], crew["joints"] = int(settings.torsion == "gate"), get_args(JointRule).index(settings.joints)
-    crew["as_published"] = int(settings.kernel == "published")
-    crew["stamp_walk"] = configs["stamp_walk"][0]
+    record, limits = made[0], settings.limits
+    record["drive_angle"], record["drive_var"] = settings.drive_joint.angle, settings.drive_joint.std**2
+    record["lower_angle"], record["lower_var"] = settings.lower_joint.angle, settings.lower_joint.std**2
+    record["unseen_var"] = settings.unseen_std**2
+    record["scheme"], record["state_every"] = int(settings.scheme), settings.state_every
+    record["torsion_gate"], record["joints"] = (
+        int(settings.torsion == "gate"),
+        get_args(JointRule).index(settings.joints),
+    )
+    record["stamp_walk"] = configs["stamp_walk"][0]
     for name in ("stiffness", "aiding_old_after"):
-        crew[name] = getattr(settings, name)
+        record[name] = getattr(settings, name)
     count = len(settings.imus)
-    crew["imus"], crew["tilt_noise"] = count, configs["force_std"][0] / configs["gravity"][0]
-    crew["place"][:count] = [imu.offset for imu in settings.imus]
-    crew["noise"][:count] = [imu.noise for imu in settings.imus]
-    crew["weight"][:count] = np.array([imu.noise for imu in settings.imus]) ** -2.0
+    record["imus"], record["tilt_noise"] = count, configs["force_std"][0] / configs["gravity"][0]
+    record["place"][:count] = [imu.offset for imu in settings.imus]
+    record["noise"][:count] = [imu.noise for imu in settings.imus]
+    record["weight"][:count] = np.array([imu.noise for imu in settings.imus]) ** -2.0
     for name in ("gyro_noise", "bias_std", "force_std"):
-        crew[f"plain_{name}"] = configs[name][0]
+        record[f"plain_{name}"] = configs[name][0]
     for name in ("rate_range", "force_range", "repeats_together", "repeats_alone"):
-        crew[name] = getattr(limits, name)
+        record[name] = getattr(limits, name)
     return made

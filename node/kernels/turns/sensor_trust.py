@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.arithmetic.jit import constant, kernel
+from node.kernels.arithmetic.jit import kernel, kernel_constant
 from node.kernels.arithmetic.quantity import NONE
 from node.kernels.filter.resets import lose_yaw
-from node.kernels.record.events import Code, tell, told_count
+from node.kernels.record.events import Code, event_count, queue_event
 
 SANE_CYCLES: Final = 3  # in a row, until the readings are used again; more than the filter's lag
-SENSOR_RECOVERED = constant(Code.SENSOR_RECOVERED)
+SENSOR_RECOVERED = kernel_constant(Code.SENSOR_RECOVERED)
 
 
 @kernel
@@ -20,7 +20,7 @@ def is_faulty(trust: Any) -> bool:
 
 
 @kernel
-def hold(node: Any) -> None:
+def hold_safe_state(node: Any) -> None:
     """Keep the safe state around a cycle: what needs the faulty sensor is unknown, and nothing is learnt."""
     state = node.filter
     if is_faulty(node.guard.gyro):
@@ -35,5 +35,5 @@ def hold(node: Any) -> None:
 @kernel
 def tell_recovery(node: Any, trust: Any) -> None:
     """Tell that a sensor has proved itself, of what fault and after how many cycles."""
-    after, cycles = told_count(node.guard.rate, trust.fault), told_count(node.guard.rate, trust.cycles)
-    tell(node, SENSOR_RECOVERED, after, cycles, NONE, NONE)
+    after, cycles = event_count(node.guard.rate, trust.fault), event_count(node.guard.rate, trust.cycles)
+    queue_event(node, SENSOR_RECOVERED, after, cycles, NONE, NONE)

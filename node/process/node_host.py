@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from node.firmware.kernel_choice import kernel_of
-from node.firmware.settings import TubeSettings
 from node.firmware.torque import TorqueSettings
+from node.firmware.tube_settings import TubeSettings
+from node.kernels.arithmetic.compiler import leave_blas_out
 from node.kernels.arithmetic.formats import PERIOD
-from node.kernels.arithmetic.jit import leave_blas_out
-from node.kernels.step.warm import warm_encoder, warm_step
+from node.kernels.step.precompile import warm_encoder, warm_step
 from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess
@@ -44,7 +44,7 @@ def run_node(
     def build(timing: CycleTiming | None = None) -> TubeProcess:
         process = TubeProcess(settings, place.folder, key=key, imus=imus, timing=timing, seals=seals)
         loop = kernel_of(settings.kernel)
-        warm_step(loop.step, loop.aiding)  # on a cold machine half a minute, for which who has said that he lives hangs
+        warm_step(loop.step, loop.aiding)  # half a minute on a cold machine: before the token of life
         return process
 
     name = f"node {settings.tube}"
@@ -70,7 +70,7 @@ def run_encoder(
     seals = seals_at(place.keys, ENCODER, reach, place.rig)
 
     def build(timing: CycleTiming | None = None) -> EncoderProcess:
-        # on a board nobody can tell a new folder from one that was lost
+        # on a board a new folder cannot be told from one that was lost
         process = EncoderProcess(place.folder, source, torque, timing, reach, seals=seals, is_new=own_time is None)
         warm_encoder()
         return process

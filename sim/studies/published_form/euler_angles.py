@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 from node.kernels.arithmetic.formats import Array
 from node.kernels.arithmetic.jit import kernel
-from node.kernels.filter.float64.propagation import BX, BY, BZ, PSI, TX, TY, symmetrise
+from node.kernels.filter.float64.propagation import BX, BY, BZ, PSI, TX, TY, symmetrise_covariance
 
 # sin phi, cos phi, tan theta, 1 / cos theta, and the rates (rad/s) about the level axis and along the slope
 Geometry: TypeAlias = tuple[float, float, float, float, float, float]
@@ -60,7 +60,7 @@ def error_rates(phi: float, theta: float, bx: float, by: float, bz: float, at: G
 
 
 @kernel
-def propagate(P: Array, dt: float, at: Geometry, config: Any) -> None:
+def propagate_covariance(P: Array, dt: float, at: Geometry, config: Any) -> None:
     """P- = F P F^T + G Q G^T in place over ``dt`` (s), on the six published states of ``P`` (8, 8).
 
     F = I + dt J with J the Jacobian of ``error_rates``, biases decay; G holds A on the rows of the attitude and B on
@@ -88,4 +88,4 @@ def propagate(P: Array, dt: float, at: Geometry, config: Any) -> None:
                 P[i, j] += walk * g[i] * g[j]
         decay = math.exp(-dt / config.bias_tau[k])
         P[BX + k, BX + k] += (config.bias_factor * config.bias_std[k]) ** 2 * (1.0 - decay * decay)
-    symmetrise(P)
+    symmetrise_covariance(P)

@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from typing import Any
 
+from node.firmware.kernel_choice import added_loop
 from sim.rig.plain_encoder import LINES
-from sim.studies.lab import REST, LabRun
+from sim.studies.lab import REST, LabRun, run_seed
+from sim.studies.published_form.published_step import published_loop
 from sim.studies.scenarios import Tables, change_sections
 from sim.studies.trials import Trials, interval_row, rms_deg
 
+KERNEL = "published"
 DELAY_MS = 10.0
 EXPERIMENTS = ("update-modes", "single-updates", "two-nodes")
 FORMS = ("published filter", "published scheme")
@@ -21,7 +24,7 @@ FORMS = ("published filter", "published scheme")
 
 def setup_of(setup: Tables, form: str) -> Tables:
     """A laboratory string with one of ``FORMS`` in place of ours."""
-    filtered = change_sections(setup, node={"kernel": "published", "scheme": "estimate"})
+    filtered = change_sections(setup, node={"kernel": KERNEL, "scheme": "estimate"})
     if form == "published filter":
         return filtered
     return change_sections(
@@ -30,6 +33,12 @@ def setup_of(setup: Tables, form: str) -> Tables:
         encoder={"counts_per_turn": LINES, "edge_times": False},
         gyroscope={"instantaneous": True},
     )
+
+
+def run_published(job: tuple[Tables, int]) -> LabRun:
+    """One seed of one scenario, whose nodes may have the published form; for a pool of processes."""
+    with added_loop(KERNEL, published_loop):
+        return run_seed(job)
 
 
 def rows_of(cases: list[tuple[str, Tables, int, float | str | None]], run_all: Trials) -> list[dict[str, Any]]:

@@ -1,1 +1,0 @@
-"""The published form of the filter, for the published experiments: Euler angles, explicit steps, feed-forward."""

@@ -1,0 +1,1 @@
+"""The published form of the filter, as a kernel of its own for the published experiments."""

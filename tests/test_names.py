@@ -1,0 +1,89 @@
+"""Names: a class and a module mean one thing in all packages, and a module's function says more than one word.
+
+Each exception stands here with its reason, and goes from here as soon as it is one no longer.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("borechain", "groundstation", "node", "sim", "telemetry")
+MOST_WORDS = 60  # one-word names of functions that may stay
+
+CLASSES: dict[str, str] = {}
+MODULES = {
+    "cycle": "the two forms of the filter, alike by contract",
+    "errors": "one tree of errors a package",
+    "figure": "one a study, by the contract of a study",
+    "fixed_lag": "the two forms of the filter, alike by contract",
+    "propagation": "the two forms of the filter, alike by contract",
+    "run": "one a study, by the contract of a study",
+    "strapdown": "the two forms of the filter, alike by contract",
+    "update": "the two forms of the filter, alike by contract",
+}
+FUNCTIONS: dict[str, str] = {}
+
+
+def modules() -> Iterator[tuple[Path, ast.Module]]:
+    """Every module of product code with its tree."""
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            yield path.relative_to(ROOT), ast.parse(path.read_text())
+
+
+def is_command(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
+    """Whether click names a command after it."""
+    called = (d.func if isinstance(d, ast.Call) else d for d in function.decorator_list)
+    return any(isinstance(d, ast.Attribute) and d.attr in ("command", "group") for d in called)
+
+
+def one_word_functions() -> dict[str, list[str]]:
+    """Public functions of modules whose name is one word, with where they stand."""
+    found = defaultdict(list)
+    for path, tree in modules():
+        for node in tree.body:
+            if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) or "_" in node.name or is_command(node):
+                continue
+            found[node.name].append(f"{path}:{node.lineno}")
+    return found
+
+
+def repeated(places: dict[str, list[str]]) -> dict[str, list[str]]:
+    return {name: found for name, found in places.items() if len(found) > 1}
+
+
+def test_a_class_name_means_one_thing() -> None:
+    places = defaultdict(list)
+    for path, tree in modules():
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef):
+                places[node.name].append(f"{path}:{node.lineno}")
+    taken = repeated(places)
+    assert {name: found for name, found in taken.items() if name not in CLASSES} == {}
+    assert CLASSES.keys() <= taken.keys(), "a reason whose name is unique by now"
+
+
+def test_a_module_name_means_one_thing() -> None:
+    places = defaultdict(list)
+    for path, _ in modules():
+        if path.stem not in ("__init__", "__main__"):
+            places[path.stem].append(str(path))
+    taken = repeated(places)
+    assert {name: found for name, found in taken.items() if name not in MODULES} == {}
+    assert MODULES.keys() <= taken.keys(), "a reason whose name is unique by now"
+
+
+def test_a_function_says_more_than_one_word() -> None:
+    found = one_word_functions()
+    assert {name: places for name, places in found.items() if name not in FUNCTIONS} == {}
+    assert FUNCTIONS.keys() <= found.keys(), "a reason whose function is gone"
+    assert sum(map(len, found.values())) <= MOST_WORDS
+
+
+def test_every_exception_has_its_reason() -> None:
+    reasons = [*CLASSES.values(), *MODULES.values(), *FUNCTIONS.values()]
+    assert all(len(reason.split()) >= 3 for reason in reasons)
