@@ -92,6 +92,7 @@ explore: $(STAMP)  ## the properties with examples that no run before has seen
 study: $(STAMP)  ## statistical tests, and every study with many seeds: its tables are committed in docs/results
 	$(MAKE) --jobs=2 --output-sync=line statistical studies
 	$(BIN)/borechain bench realtime --nodes 50 --seconds 120 --out docs/results
+	$(BIN)/python -P benchmarks/codec.py
 	$(BIN)/python docs/make_faults.py
 
 # what the tests leave of the cores, the studies use; they are in no test's way

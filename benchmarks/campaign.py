@@ -24,23 +24,21 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from node.firmware.block_trial import record_of
 from node.kernels.arithmetic.angles import wrap_angle
-from node.kernels.arithmetic.formats import CYCLE_RATE_HZ, PERIOD
+from node.kernels.arithmetic.formats import CYCLE_RATE_HZ
 from node.kernels.filter.float64.cycle import run_cycle
 from node.kernels.record.node_record import A_HOPS, A_SEQUENCE, A_SYSTEMATIC, A_VALID, A_YAW, A_YAW_VAR, READING
-from node.kernels.step.address import firmware_addresses
 from node.kernels.string.relay import offer_aiding
 from sim.campaign.chunk import RUNS, Campaign, run_chunk
-from sim.campaign.course import Course
-from sim.campaign.draws import Draws, draws_of, fresh_nodes, noise_of, tubes_of
-from sim.campaign.drill import CODES, STATE_OF, SURVEY, drill
-from sim.campaign.sensors import Work, draw, new_work, read_sensors
-from sim.rig.encoder_course import measured_of
+from sim.string.drill import drill_string, new_memory
+from sim.string.head_measurements import measure_head
+from sim.string.hops import draw_hops
+from sim.string.nodes import loop_of, new_nodes
+from sim.string.readings import DrawnReadings, draw_readings
+from sim.string.schedule import StringSchedule, redraw_schedule
 from sim.studies.epochs import resting_string
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
-from telemetry.parameters import ParameterBlock
 
 ROOT = Path(__file__).parents[1]
 SEED = 1
@@ -62,44 +60,31 @@ class Tape(NamedTuple):
 
 @njit(error_model="numpy")
 def kernels(
-    is_drawn: bool,
-    nodes: Any,
-    crews: Any,
-    course: Course,
-    noise: Any,
-    tubes: Any,
-    draws: Draws,
-    key: Any,
-    work: Work,
-    tape: Tape,
+    is_drawn: bool, nodes: Any, settings: Any, schedule: StringSchedule, drawn: DrawnReadings, hops: Any, tape: Tape
 ) -> None:
     """The filter of every node over all cycles: what it reads is drawn here, or lies on the ``tape``."""
-    for cycle in range(course.ends.shape[0]):
-        top = course.powered[cycle]
-        start, end = course.begin + cycle * PERIOD, course.ends[cycle]
+    for cycle in range(schedule.ends.shape[0]):
+        top, start, end = schedule.powered[cycle], schedule.begins[cycle], schedule.ends[cycle]
+        if is_drawn:
+            draw_readings(drawn, None, schedule, hops, cycle)
         for k in range(top):
             if is_drawn:
-                draw(work.counter, key, work.words, work.drawn, cycle, k)
-                is_first = cycle == 0 or course.powered[cycle - 1] <= k
-                above = tubes[k - 1].hop_error if k > 0 else 0.0
-                felt = course.rate, course.force, course.circle, course.shaken
-                read_sensors(noise[0], tubes[k], is_first, above, *felt, work.drawn, work.readings[k], cycle, k)
-                reading = work.readings[k, 0]
+                reading = drawn.readings[k, 0]
             else:
                 reading = tape.readings[cycle, k]
-                tubes[k].hop_error, tubes[k].hop_loses = tape.errors[cycle, k], tape.loses[cycle, k]
-            joined = 1 if course.joined[cycle, k] != 0.0 else 0
+                hops[k].error, hops[k].loses = tape.errors[cycle, k], tape.loses[cycle, k]
+            joined = 1 if schedule.joined[cycle, k] != 0.0 else 0
             run_cycle(nodes[k].filter, nodes[k].config, reading[0:3], reading[3:6], start, end, joined)
-        if not (course.heard[cycle] and draws.heard[cycle]):
+        if not schedule.is_sent[cycle]:
             continue
-        told = draws.measured[cycle]
+        told = schedule.measured[cycle]
         offset, systematic = 0.0, told[A_SYSTEMATIC]
         for hop in range(top):
-            if tubes[hop].hop_loses:
+            if hops[hop].loses:
                 break
             k = top - 1 - hop
-            offset = wrap_angle(offset + (crews[k].drive_angle if hop == 0 else crews[k + 1].lower_angle))
-            systematic += crews[k].drive_var if hop == 0 else crews[k + 1].lower_var
+            offset = wrap_angle(offset + (settings[k].drive_angle if hop == 0 else settings[k + 1].lower_angle))
+            systematic += settings[k].drive_var if hop == 0 else settings[k + 1].lower_var
             offer_aiding(
                 nodes[k].filter,
                 nodes[k].config,
@@ -107,24 +92,20 @@ def kernels(
                 told[A_YAW_VAR],
                 systematic,
                 offset,
-                told[A_VALID] + tubes[hop].hop_error,
+                told[A_VALID] + hops[hop].error,
                 int(told[A_SEQUENCE]),
                 int(told[A_HOPS]) + hop,
             )
 
 
 @njit(error_model="numpy")
-def record(course: Course, noise: Any, tubes: Any, key: Any, work: Work, tape: Tape) -> None:
+def record(schedule: StringSchedule, drawn: DrawnReadings, hops: Any, tape: Tape) -> None:
     """Draw what ``kernels`` would, and keep it."""
-    for cycle in range(course.ends.shape[0]):
-        for k in range(course.powered[cycle]):
-            draw(work.counter, key, work.words, work.drawn, cycle, k)
-            is_first = cycle == 0 or course.powered[cycle - 1] <= k
-            above = tubes[k - 1].hop_error if k > 0 else 0.0
-            felt = course.rate, course.force, course.circle, course.shaken
-            read_sensors(noise[0], tubes[k], is_first, above, *felt, work.drawn, work.readings[k], cycle, k)
-            tape.readings[cycle, k] = work.readings[k, 0]
-            tape.errors[cycle, k], tape.loses[cycle, k] = tubes[k].hop_error, tubes[k].hop_loses
+    for cycle in range(schedule.ends.shape[0]):
+        draw_readings(drawn, None, schedule, hops, cycle)
+        for k in range(schedule.powered[cycle]):
+            tape.readings[cycle, k] = drawn.readings[k, 0]
+            tape.errors[cycle, k], tape.loses[cycle, k] = hops[k].error, hops[k].loses
 
 
 class OneRun:
@@ -133,32 +114,30 @@ class OneRun:
     def __init__(self, scenario: Scenario) -> None:
         self.campaign = Campaign(scenario)
         self.world = World(scenario, SEED)
-        self.course, self.noise = self.campaign.course, noise_of(scenario.file)
-        self.draws = draws_of(self.world, measured_of(self.world))
-        self.key, self.work = np.array([SEED, 0], np.uint64), new_work(scenario.tubes)
-        shape = (len(self.course.ends), scenario.tubes)
+        self.schedule = redraw_schedule(self.campaign.string.schedule, self.world, measure_head(self.world))
+        shape = (self.world.cycles, scenario.tubes)
         self.tape = Tape(np.zeros((*shape, READING)), np.zeros(shape), np.zeros(shape, np.int64))
-        record(self.course, self.noise, self.tubes(), self.key, self.work, self.tape)
+        record(self.schedule, *self.drawn(), self.tape)
 
-    def tubes(self) -> Any:
-        """Sensors of the tubes, as new."""
-        return tubes_of(self.world, self.draws.frame)
+    def drawn(self) -> tuple[DrawnReadings, Any]:
+        """What readings are drawn from, and the hops, as new."""
+        string = self.campaign.string
+        return string.new_readings(self.world), draw_hops(self.world)
 
     def kernels(self, *, is_drawn: bool) -> tuple[float, bytes]:
         """Seconds of a node-cycle, and the yaws at the end."""
-        nodes, crews = fresh_nodes(self.world)
-        taken = self.course, self.noise, self.tubes(), self.draws, self.key, self.work, self.tape
-        seconds = spent(lambda: kernels(is_drawn, nodes, crews, *taken))
+        nodes, settings, _ = new_nodes(self.world)
+        taken = self.schedule, *self.drawn(), self.tape
+        seconds = spent(lambda: kernels(is_drawn, nodes, settings, *taken))
         return seconds / self.campaign.node_cycles, nodes["filter"]["now_yaw"].tobytes()
 
     def whole(self) -> float:
         """Seconds of a node-cycle of the campaign's own loop."""
-        nodes, crews = fresh_nodes(self.world)
-        count, epochs = len(nodes), len(self.course.epochs)
-        corrections = np.stack([np.concatenate([record_of(ParameterBlock(k + 1, 0))] * 2) for k in range(count)])
-        taken = nodes, crews, corrections, self.course, self.noise, self.tubes(), self.draws, None, self.key
-        kept = np.zeros(count * epochs, SURVEY), np.zeros((epochs, count), STATE_OF), np.zeros((count, CODES), np.int64)
-        return spent(lambda: drill(*firmware_addresses(), *taken, self.work, *kept)) / self.campaign.node_cycles
+        (drawn, hops), log = self.drawn(), self.campaign.string.new_log()
+        loop, nodes = loop_of("float64", len(hops)), new_nodes(self.world)
+        shifts, memory, cycles = np.zeros(len(hops)), new_memory(), self.world.cycles
+        given = *loop, nodes, self.schedule, hops, shifts, memory, 0, cycles
+        return spent(lambda: drill_string(*given, drawn=drawn, log=log)) / self.campaign.node_cycles
 
     def with_columns(self) -> float:
         """Seconds of a node-cycle of a run from its draws to its columns."""
@@ -223,8 +202,8 @@ def long_string() -> tuple[float, float]:
     """Processor's seconds of one run of a string of ``LONG`` tubes, and the rig's seconds in it."""
     campaign = Campaign(scenario_of(dict(resting_string(LONG))))
     campaign.run(SEED)
-    course = campaign.course
-    return statistics.median(spent(lambda: campaign.run(SEED)) for _ in range(3)), len(course.ends) / CYCLE_RATE_HZ
+    cycles = len(campaign.string.schedule.ends)
+    return statistics.median(spent(lambda: campaign.run(SEED)) for _ in range(3)), cycles / CYCLE_RATE_HZ
 
 
 def beside(ours: float, peer: float, **asked: float) -> dict[str, float]:

@@ -8,7 +8,6 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from telemetry.application.can_load import HEADER, steady_traffic
 from telemetry.application.depth_seal import open_depth, seal_depth
 from telemetry.application.end_seal import content_of_sealed, is_sealed
 from telemetry.application.seals import Seals, seals_of
+from telemetry.frozen import replace
 from telemetry.media.credentials import DEPTH_SOURCE
 from telemetry.messages import (
     BASE,

@@ -16,26 +16,20 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.tube import Tube
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import (
     AIDING,
-    CLOCK_VAR,
-    END,
-    HOPS,
-    JOINED,
-    MOMENT,
-    READING,
-    START,
-    SYNCHRONISED,
     new_node,
 )
 from node.kernels.record.sensor_record import PARAMETERS
-from node.kernels.step.address import firmware_addresses
-from node.kernels.step.string_step import string_aiding, string_step
+from sim.string.drill import drill_string, new_memory
+from sim.string.hops import HOP
+from sim.string.nodes import StringNodes, loop_of
+from sim.string.readings import RecordedReadings, record_readings
+from sim.string.schedule import StringSchedule
 from sim.studies.epochs import resting_string
 from sim.world.scenario import scenario_of
 from sim.world.world import World
@@ -48,28 +42,33 @@ NEVER = 10**9  # cycles
 
 
 class Inputs(NamedTuple):
-    """What the nodes take in, cycle by cycle: (cycles, tubes, 1, 8), (cycles, tubes, 6) and (cycles, 12)."""
+    """What the nodes of a complete string take in: readings, times of cycles, what the encoder measures."""
 
-    readings: Any
-    moments: Any
-    aidings: Any
+    recorded: RecordedReadings
+    schedule: StringSchedule
 
 
 def inputs_of(world: World) -> Inputs:
     """Readings of every tube, the times of its cycles, and an exact measurement of the drive head after each."""
-    cycles, tubes = world.cycles, world.scenario.tubes
-    readings = np.zeros((cycles, tubes, 1, READING))
-    moments, aidings = np.zeros((cycles, tubes, MOMENT)), np.zeros((cycles, AIDING))
+    cycles, tubes, none = world.cycles, world.scenario.tubes, np.zeros(world.scenario.tubes)
+    aidings = np.zeros((cycles, AIDING))
     angle, rate, _ = world.motion.drive(world.ends)
-    for k in range(tubes):
-        readings[:, k, 0, :6] = world.sensors.samples(k + 1)
-        readings[:, k, 0, 6] = 25.0
-        moments[:, k, START], moments[:, k, END] = world.ends - (world.ends[1] - world.ends[0]), world.ends
-        moments[:, k, HOPS], moments[:, k, CLOCK_VAR] = tubes - k, CLOCK_STD**2 * (tubes - k)
-    moments[:, :, JOINED] = moments[:, :, SYNCHRONISED] = 1.0
     aidings[:, 0], aidings[:, 1], aidings[:, 4] = angle % (2.0 * np.pi), 2.7e-9, rate
     aidings[:, 5], aidings[:, 6] = world.ends, np.arange(cycles)
-    return Inputs(readings, moments, aidings)
+    schedule = StringSchedule(
+        begins=world.ends - (world.ends[1] - world.ends[0]),
+        ends=world.ends,
+        later=none,
+        powered=np.full(cycles, tubes),
+        joined=np.ones((cycles, tubes)),
+        clock_var=CLOCK_STD**2 * np.arange(1.0, tubes + 1.0),
+        measured=aidings,
+        is_sent=np.ones(cycles, np.bool_),
+        dated_late=none,
+        locked=True,
+    )
+    nothing = np.zeros((cycles, tubes))
+    return Inputs(record_readings(world)._replace(errors=nothing, losses=nothing > 0.0), schedule)
 
 
 class String:
@@ -92,23 +91,25 @@ class String:
             )
             for k, one in enumerate(settings)
         ]
-        self.crews = np.concatenate([tube.settings_record for tube in self.tubes])
-        self.places = np.arange(tubes)[::-1].copy()
+        settings = np.concatenate([tube.settings_record for tube in self.tubes])
+        self.arrays = StringNodes(self.nodes, settings, self.corrections)
 
 
 def node_by_node(string: String, inputs: Inputs) -> Callable[[], None]:
     """Every node by its own object, from Python, as a process calls it."""
-    cycles, tubes = inputs.aidings.shape[0], len(string.tubes)
+    schedule, cycles, tubes = inputs.schedule, len(inputs.schedule.ends), len(string.tubes)
+    spans = list(zip(schedule.begins.tolist(), schedule.ends.tolist(), strict=True))
     readings = [
         [
-            ImuReading(*moment[START : END + 1].tolist(), tuple(row[0, :3].tolist()), tuple(row[0, 3:6].tolist()))
-            for row, moment in zip(inputs.readings[k], inputs.moments[k], strict=True)
+            ImuReading(*span, tuple(row[0, :3].tolist()), tuple(row[0, 3:6].tolist()))
+            for row in inputs.recorded.readings[k]
         ]
-        for k in range(cycles)
+        for k, span in enumerate(spans)
     ]
     around = [RigContext(True, tubes - k, 0.0, CLOCK_STD**2 * (tubes - k), True) for k in range(tubes)]
     heard = [
-        Aiding(a[0], a[1], a[2], a[3], a[4], a[5], int(a[6]), int(a[7])) for a in map(np.ndarray.tolist, inputs.aidings)
+        Aiding(a[0], a[1], a[2], a[3], a[4], a[5], int(a[6]), int(a[7]))
+        for a in map(np.ndarray.tolist, schedule.measured)
     ]
 
     def run() -> None:
@@ -123,60 +124,28 @@ def node_by_node(string: String, inputs: Inputs) -> Callable[[], None]:
 
 
 def string_by_string(string: String, inputs: Inputs) -> Callable[[], None]:
-    """A cycle of the whole string in one call from Python, as a study calls it."""
-    tubes = len(string.tubes)
-    mask, says = np.ones(tubes, np.bool_), np.zeros(tubes, np.int64)
-    step, aid = firmware_addresses()
+    """A cycle of the whole string in one call from Python, as a study calls it that acts between two."""
+    drilled = drilling(string, inputs)
 
     def run() -> None:
-        nodes, crews = string.nodes, string.crews
-        for k in range(len(inputs.aidings)):
-            readings, moments = inputs.readings[k], inputs.moments[k]
-            string_step(step, nodes, crews, string.corrections, readings, moments, mask, says)
-            valid = np.full(tubes, inputs.aidings[k, 5])
-            string_aiding(aid, nodes, crews, string.places, tubes, valid, inputs.aidings[k].copy())
+        for k in range(len(inputs.schedule.ends)):
+            drilled(k, k + 1)
 
     return run
-
-
-@njit
-def all_cycles(
-    step: Any,
-    aid: Any,
-    nodes: Any,
-    crews: Any,
-    corrections: Any,
-    readings: Any,
-    moments: Any,
-    aidings: Any,
-    places: Any,
-    mask: Any,
-    says: Any,
-    valid: Any,
-    work: Any,
-) -> None:
-    """Every cycle of the string in one compiled loop."""
-    for k in range(aidings.shape[0]):
-        string_step(step, nodes, crews, corrections, readings[k], moments[k], mask, says)
-        for j in range(valid.shape[0]):
-            valid[j] = aidings[k, 5]
-        for j in range(work.shape[0]):
-            work[j] = aidings[k, j]
-        string_aiding(aid, nodes, crews, places, places.shape[0], valid, work)
 
 
 def compiled(string: String, inputs: Inputs) -> Callable[[], None]:
     """All cycles in one call."""
-    tubes = len(string.tubes)
-    work = np.ones(tubes, np.bool_), np.zeros(tubes, np.int64), np.zeros(tubes), np.zeros(AIDING)
+    drilled = drilling(string, inputs)
+    return lambda: drilled(0, len(inputs.schedule.ends))
 
-    def run() -> None:
-        tables = string.nodes, string.crews, string.corrections
-        all_cycles(
-            *firmware_addresses(), *tables, inputs.readings, inputs.moments, inputs.aidings, string.places, *work
-        )
 
-    return run
+def drilling(string: String, inputs: Inputs) -> Callable[[int, int], None]:
+    """The kernel of a string, from a cycle to another."""
+    count, memory = len(string.tubes), new_memory()
+    hops, shifts = np.zeros(count, HOP), np.zeros(count)
+    given = *loop_of("float64", count), string.arrays, inputs.schedule, hops, shifts, memory
+    return lambda first, last: drill_string(*given, first, last, inputs.recorded)
 
 
 def run() -> dict[str, Any]:
@@ -208,7 +177,7 @@ def run() -> dict[str, Any]:
             work = caller(string, inputs)
             begin = time.thread_time()
             work()
-            spent = (time.thread_time() - begin) / (len(inputs.aidings) * TUBES)
+            spent = (time.thread_time() - begin) / (len(inputs.schedule.ends) * TUBES)
             if block:  # the first compiles or loads
                 times[name].append(spent)
             yaws[name] = string.nodes["filter"]["now_yaw"].tobytes()

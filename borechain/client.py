@@ -1,13 +1,14 @@
 """A ground station asked, followed and ordered from Python.
 
-    from borechain.client import connect
+    from borechain.client import connect_to_ground
 
-    with connect("tcp/127.0.0.1:7447", "rig-1") as ground:
+    with connect_to_ground("tcp/127.0.0.1:7447", "rig-1") as ground:
         print(ground.verdict().line)
         for row in ground.stream("measurements"):
             print(row["md_m"], row["inclination_deg"])
 
-Everything that docs/keys.md names can be asked with ``ask``; what most programs need has a type.
+Everything that docs/keys.md names can be asked with ``ask``; what most programs need comes in the class that the ground
+station makes of it.
 
 Errors::
 
@@ -23,18 +24,42 @@ import contextlib
 import json
 import queue
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
+from borechain.rig_search import live_rigs, who_is_there
+from groundstation.service.answers.answer_table import ANSWERS
+from groundstation.service.answers.shapes.alarm_shapes import Alarm
+from groundstation.service.answers.shapes.answer_fields import AnswerField, answer_class, fields_of_answer
+from groundstation.service.answers.shapes.column_shapes import Off, Steer, Verdict
+from groundstation.service.answers.shapes.hole_shapes import Station
+from groundstation.service.answers.shapes.order_shapes import Order
+from groundstation.service.answers.shapes.string_shapes import AnswerHeader
 from telemetry import keys
 from telemetry.errors import BorechainError
 from telemetry.media.credentials import credentials_for
 from telemetry.media.zenoh_bus import ZenohBus, open_client
 
+__all__ = [
+    "Alarm",
+    "AnswerError",
+    "AnsweredVerdict",
+    "ClientError",
+    "Ground",
+    "NoAnswerError",
+    "Off",
+    "Order",
+    "RefusedError",
+    "Station",
+    "Steer",
+    "Verdict",
+    "connect_to_ground",
+    "live_rigs",
+    "shape_answer",
+]
 PATIENCE, ORDER_PATIENCE = 5.0, 40.0  # wall s; the ground station itself waits 30 s for a tube
 TIMEOUT = "Timeout"  # zenoh's text for an answer that did not come
-STREAMS = ("events", "measurements", "static_records")
+STREAMS = sorted(path for path, one in ANSWERS.items() if one.is_stream)
 View = dict[str, Any]
 Shape = TypeVar("Shape")
 
@@ -55,99 +80,9 @@ class AnswerError(ClientError, ValueError):
     """The answer is not one of this version."""
 
 
-@dataclass(frozen=True, slots=True)
-class Off:
-    """How far off the hole is, at which measured depth, and towards which azimuth."""
-
-    md_m: float
-    deviation_cm: float
-    sigma_cm: float
-    limit_cm: float
-    used_percent: float | None
-    azimuth_deg: float
-    wind: str
-
-
-@dataclass(frozen=True, slots=True)
-class Steer:
-    """Where to steer to, and the last depth from which it helps."""
-
-    azimuth_deg: float
-    wind: str
-    before_md_m: float | None
-    left_m: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """on_target, watch, steer, out or dont_know, with its reasons; good for ``good_for_s`` after its arrival."""
-
-    verdict: str
-    by_surveys: str
-    line: str
-    why: list[str]
-    doubts: list[str]
-    good_for_s: float
-    bit_md_m: float | None
-    target_m: float
-    what: str | None
-    off: Off | None
-    steer: Steer | None
-    utc: str
-    rig_time_s: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class Alarm:
-    """One open alarm."""
-
-    number: int
-    state: str
-    code: str
-    level: str
-    subject: str
-    detail: str
-    threshold: str
-    md_m: float | None
-    azimuth_deg: float | None
-    wind: str | None
-    since_s: float | None
-    since_utc: str | None
-    acknowledged_by: str | None
-    shelved_by: str | None
-
-
-@dataclass(frozen=True, slots=True)
-class Station:
-    """One station of the hole, fused."""
-
-    station: int
-    md_m: float
-    inclination_deg: float
-    azimuth_deg: float
-    sigma_inclination_deg: float
-    sigma_azimuth_deg: float
-    measurements: int
-    north_m: float
-    east_m: float
-    tvd_m: float
-    sigma_north_m: float
-    sigma_east_m: float
-    sigma_tvd_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class Order:
-    """An order and what became of it."""
-
-    order: int
-    command: str
-    tube: int | None
-    by: str
-    state: str
-    done: bool | None
-    detail: str
-    values: View
+@answer_class
+class AnsweredVerdict(Verdict, AnswerHeader):
+    """A verdict behind the header of its answer, which says of when it is."""
 
 
 class Ground:
@@ -174,19 +109,17 @@ class Ground:
         """
         return self._get(keys.GROUND.format(rig=self._rig, path=path), parameters, self._patience)
 
-    def verdict(self) -> Verdict:
+    def verdict(self) -> AnsweredVerdict:
         """The verdict of now; errors as ``ask``, and AnswerError."""
-        view = self.ask("verdict")
-        off, steer = view.get("off"), view.get("steer")
-        return shaped(Verdict, view | {"off": off and shaped(Off, off), "steer": steer and shaped(Steer, steer)})
+        return shape_answer(AnsweredVerdict, self.ask("verdict"))
 
     def alarms(self) -> list[Alarm]:
         """Open alarms, the worst first; errors as ``verdict``."""
-        return [shaped(Alarm, row) for row in self.ask("alarms")["open"]]
+        return [shape_answer(Alarm, row) for row in self.ask("alarms")["open"]]
 
     def stations(self) -> list[Station]:
         """Stations from the collar down; errors as ``verdict``."""
-        return [shaped(Station, row) for row in self.ask("stations")["stations"]]
+        return [shape_answer(Station, row) for row in self.ask("stations")["stations"]]
 
     def order(self, name: str, by: str, **parameters: object) -> Order:
         """Order something and wait for its outcome; ``by`` says who.
@@ -196,7 +129,7 @@ class Ground:
         NoAnswerError, RefusedError, AnswerError
         """
         selector = keys.COMMAND.format(rig=self._rig, name=name)
-        return shaped(Order, self._get(selector, parameters | {"by": by}, ORDER_PATIENCE))
+        return shape_answer(Order, self._get(selector, parameters | {"by": by}, ORDER_PATIENCE))
 
     def follow(self, path: str, call: Callable[[str, View], object]) -> None:
         """Call ``call(path, answer)`` on a foreign thread with each answer published below ``path``."""
@@ -245,7 +178,7 @@ class Ground:
 
 
 @contextlib.contextmanager
-def connect(
+def connect_to_ground(
     endpoint: str = keys.DEFAULT_ENDPOINT,
     rig: str = keys.DEFAULT_RIG,
     timeout: float = PATIENCE,
@@ -266,28 +199,25 @@ def connect(
         yield Ground(bus, rig)
 
 
-def live_rigs(bus: ZenohBus, timeout: float = 1.0) -> list[str]:
-    """Names of the rigs that have a ground station now."""
-    tokens = bus.tokens(keys.LEASE.format(rig="*", holder="*"), timeout)
-    return sorted({token.split("/")[1] for token in tokens})
-
-
-def who_is_there(bus: ZenohBus) -> str:
-    """Line that lists the rigs with a ground station, for the error on an unknown rig."""
-    rigs = live_rigs(bus)
-    return f"rigs with a ground station: {', '.join(rigs)}" if rigs else "no rig has a ground station here"
-
-
-def shaped(shape: type[Shape], view: View) -> Shape:
-    """A part of an answer in its type; what a later version has more is left out.
+def shape_answer(shape: type[Shape], view: View) -> Shape:
+    """An answer, or a part of one, in its class; what a later version has more is left out.
 
     Raises
     ------
     AnswerError
         Naming what is missing.
     """
-    names = [field.name for field in fields(shape)]  # type: ignore[arg-type]
-    missing = [name for name in names if name not in view]
+    fields = fields_of_answer(shape)
+    missing = [field.name for field in fields if field.name not in view]
     if missing:
         raise AnswerError(f"{shape.__name__}: the answer lacks {', '.join(missing)}; is the ground station older?")
-    return shape(**{name: view[name] for name in names})
+    return shape(**{field.name: shape_value(field, view[field.name]) for field in fields})
+
+
+def shape_value(field: AnswerField, value: Any) -> Any:
+    """Value of one field, answers within it in their classes; errors as ``shape_answer``."""
+    if value is None or field.shape is None:
+        return value
+    if field.kind == "map":
+        return {name: shape_answer(field.shape, one) for name, one in value.items()}
+    return [shape_answer(field.shape, one) for one in value] if field.rank else shape_answer(field.shape, value)

@@ -11,19 +11,13 @@ DOCS = Path(__file__).parent
 sys.path[:0] = [str(DOCS.parent)]
 
 from borechain import __version__  # noqa: E402
-from groundstation.service.answers.answer_fields import object_schema  # noqa: E402
-from groundstation.service.answers.paths import FIXED, MEMBERS  # noqa: E402
-from telemetry import keys  # noqa: E402
-
-PUBLISHED = {
-    key.template: key for key in keys.TABLE if "/ground/" in key.template and key.kind in ("publish", "query, publish")
-}
+from groundstation.service.answers.answer_table import ANSWERS  # noqa: E402
+from groundstation.service.answers.shapes.answer_fields import object_schema  # noqa: E402
 
 
 def document() -> dict[str, Any]:
     """The whole document; names are those of the paths below ``ground/``."""
-    found = {pattern: path.fields for pattern, path in (FIXED | MEMBERS).items()}
-    names = {pattern: pattern.replace("/", "_").replace("{", "").replace("}", "") for pattern in found}
+    names = {path: path.replace("/", "_").replace("{", "").replace("}", "") for path in ANSWERS}
     return {
         "asyncapi": "3.0.0",
         "info": {
@@ -33,27 +27,22 @@ def document() -> dict[str, Any]:
         },
         "defaultContentType": "application/json",
         "channels": {
-            names[pattern]: {
-                "address": keys.GROUND.format(rig="{rig}", path=pattern),
-                "parameters": {name: {} for name in parameters(pattern)},
-                "messages": {"answer": {"$ref": f"#/components/messages/{names[pattern]}"}},
+            names[path]: {
+                "address": answer.key.template,
+                "parameters": {name: {} for name in ("rig", *answer.numbers)},
+                "messages": {"answer": {"$ref": f"#/components/messages/{names[path]}"}},
             }
-            for pattern in found
+            for path, answer in ANSWERS.items()
         },
         "operations": {
-            f"hear_{names[pattern]}": {"action": "receive", "channel": {"$ref": f"#/channels/{names[pattern]}"}}
-            for pattern in found
-            if keys.GROUND.format(rig="{rig}", path=pattern) in PUBLISHED
+            f"hear_{names[path]}": {"action": "receive", "channel": {"$ref": f"#/channels/{names[path]}"}}
+            for path, answer in ANSWERS.items()
+            if answer.published
         },
         "components": {
-            "messages": {names[pattern]: {"payload": object_schema(fields)} for pattern, fields in found.items()}
+            "messages": {names[path]: {"payload": object_schema(answer.fields)} for path, answer in ANSWERS.items()}
         },
     }
-
-
-def parameters(pattern: str) -> list[str]:
-    """Names in a pattern's braces, and the rig."""
-    return ["rig", *(part.strip("{}") for part in pattern.split("/") if part.startswith("{"))]
 
 
 def text() -> str:

@@ -19,9 +19,9 @@ from install_browser import find_browser  # noqa: E402
 from playwright.sync_api import expect, sync_playwright  # noqa: E402
 
 from borechain.drilling.inline import InlineRig  # noqa: E402
+from groundstation.gateway.page.page_settings import PageSettings, open_page_socket  # noqa: E402
 from groundstation.gateway.page.passwords import hash_of  # noqa: E402
 from groundstation.gateway.page.server import serving_page  # noqa: E402
-from groundstation.gateway.page.settings import PageSettings, listen  # noqa: E402
 from sim.rig.ground_settings import ground_settings  # noqa: E402
 from sim.rig.scheduler import Scheduler  # noqa: E402
 from sim.world.scenario import load_scenario  # noqa: E402
@@ -59,7 +59,7 @@ async def live(
     rig: InlineRig, scheduler: Scheduler, page: PageSettings, ready: threading.Event, end: asyncio.Event
 ) -> None:
     """Serve the page while the rig goes on."""
-    async with serving_page(rig.ground, page, listen(page)):
+    async with serving_page(rig.ground, page, open_page_socket(page)):
         at = rig.world.phases[-1].start
         while not end.is_set():
             at += BEAT_S

@@ -16,10 +16,9 @@ sys.path[:0] = [str(DOCS.parent), str(DOCS)]
 import node_tables  # noqa: E402
 
 from groundstation.service.alarms.rig_alarms import KINDS  # noqa: E402
-from groundstation.service.answers.answer_fields import Fields  # noqa: E402
-from groundstation.service.answers.paths import FIXED, MEMBERS  # noqa: E402
+from groundstation.service.answers.answer_table import ANSWERS, known_keys  # noqa: E402
+from groundstation.service.answers.shapes.answer_fields import Fields  # noqa: E402
 from groundstation.survey.fusion.survey_trust import EFFECTS, TOGETHER  # noqa: E402
-from telemetry import keys  # noqa: E402
 from telemetry.application.arguments import shown_name, shown_range  # noqa: E402
 from telemetry.application.commands import COMMANDS, Argument, CommandSpec  # noqa: E402
 from telemetry.quantities import Quantity  # noqa: E402
@@ -62,7 +61,7 @@ def field_row(f: Field) -> tuple[str, ...]:
 
 def key_table() -> str:
     """Every key expression."""
-    return table(("key", "kind", "meaning"), [(f"`{k.template}`", k.kind, k.meaning) for k in keys.TABLE])
+    return table(("key", "kind", "meaning"), [(f"`{k.template}`", k.kind, k.meaning) for k in known_keys()])
 
 
 def tube_commands() -> str:
@@ -105,9 +104,7 @@ def shortened(quantities: tuple[Quantity, ...]) -> list[Quantity]:
 
 def answers() -> str:
     """Fields of every answer."""
-    members = {pattern: member.fields for pattern, member in MEMBERS.items()}
-    found: dict[str, Fields] = {path: fixed.fields for path, fixed in FIXED.items()} | members
-    return "\n".join(f"### `{path}`\n\n{answer(fields)}" for path, fields in found.items())
+    return "\n".join(f"### `{path}`\n\n{answer(found.fields)}" for path, found in ANSWERS.items())
 
 
 def answer(fields: Fields) -> str:

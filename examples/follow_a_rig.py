@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import sys
 
-from borechain.client import connect
+from borechain.client import connect_to_ground
 from telemetry import keys
 
 
 def follow(endpoint: str = keys.DEFAULT_ENDPOINT, rig: str = keys.DEFAULT_RIG, silence_s: float = 60.0) -> None:
     """Print what the crew of a rig is told, until no survey has come for ``silence_s``."""
-    with connect(endpoint, rig) as ground:
+    with connect_to_ground(endpoint, rig) as ground:
         print(ground.verdict().line)
         for survey in ground.stream("measurements", timeout=silence_s):
             print(f"tube {survey['tube']} at {survey['md_m']:.1f} m: {survey['inclination_deg']:.2f} deg")

@@ -11,7 +11,7 @@ from typing import Any
 
 from groundstation.config import GroundConfig, checked_config
 from groundstation.gateway.lease import take_lease
-from groundstation.gateway.page.settings import PageSettings, listen
+from groundstation.gateway.page.page_settings import PageSettings, open_page_socket
 from groundstation.gateway.zenoh import ZenohGateway
 from groundstation.service.process.ground_process import GroundProcess
 from node.kernels.arithmetic.formats import PERIOD
@@ -29,7 +29,7 @@ from telemetry.runtime.timing import CycleTiming
 
 NAME = "ground"
 ServePage = Callable[[GroundProcess], contextlib.AbstractAsyncContextManager[None]]
-Doors = Callable[[], contextlib.AbstractAsyncContextManager["asyncio.Task[None]"]]
+OpenGateways = Callable[[], contextlib.AbstractAsyncContextManager["asyncio.Task[None]"]]
 
 
 def run_ground(
@@ -59,9 +59,11 @@ def run_ground(
         ):
             warn_of_keys(NAME, process.endpoint.seals)
             take_lease(bus, place.rig)
-            doors = partial(answering, process, bus, serve_page)
+            open_gateways = partial(answering, process, bus, serve_page)
             run_event_loop(
-                serve_by_own_clock(process, bus, doors) if own_clock else serve_on_stepper(process, bus, place, doors)
+                serve_by_own_clock(process, bus, open_gateways)
+                if own_clock
+                else serve_on_stepper(process, bus, place, open_gateways)
             )
 
 
@@ -90,10 +92,10 @@ def no_page(_process: GroundProcess) -> contextlib.AbstractAsyncContextManager[N
     return contextlib.nullcontext()
 
 
-async def serve_by_own_clock(process: GroundProcess, bus: ZenohBus, doors: Doors) -> None:
+async def serve_by_own_clock(process: GroundProcess, bus: ZenohBus, open_gateways: OpenGateways) -> None:
     """Run the ground station by its own clock, below it the encoder, until a signal ends it."""
     rig = process.config.rig
-    async with doors() as answers:
+    async with open_gateways() as answers:
         ports = neighbour_ports(ZenohMedium(bus), rig, BASE, {Side.LOWER: ENCODER})
         loop = OwnClockLoop(process, ports, OwnClock(), CycleTiming(), PERIOD, partial(write_warning, NAME))
         process.operator.wake = lambda: loop.call(lambda woken, now: woken.on_timer(now))
@@ -102,10 +104,10 @@ async def serve_by_own_clock(process: GroundProcess, bus: ZenohBus, doors: Doors
         await loop.run()
 
 
-async def serve_on_stepper(process: GroundProcess, bus: ZenohBus, place: Place, doors: Doors) -> None:
+async def serve_on_stepper(process: GroundProcess, bus: ZenohBus, place: Place, open_gateways: OpenGateways) -> None:
     """Run the ground station step by step until a signal ends it; between two steps operators are answered."""
     rig = process.config.rig
-    async with doors() as answers:
+    async with open_gateways() as answers:
         ports = stepped_ports(ZenohMedium(bus), rig, BASE, [Side.LOWER])
         with place.step_stream(address_name(BASE)) as stream:
             client = AsyncStepClient(bus, rig, BASE, ports, stream)  # its token of life is last
@@ -136,7 +138,7 @@ def page_of(page: PageSettings | None) -> Iterator[ServePage]:
         return
     from groundstation.gateway.page.server import serving_page  # without a page no web server is loaded
 
-    with listen(page) as listening:
+    with open_page_socket(page) as listening:
         write_warning(NAME, f"page {page.url}")
         yield lambda process: serving_page(process, page, listening)
 

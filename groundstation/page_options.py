@@ -13,7 +13,7 @@ from telemetry.media.credentials import needs_tls
 from telemetry.runtime.process_options import INSECURE
 
 if TYPE_CHECKING:
-    from groundstation.gateway.page.settings import PageSettings
+    from groundstation.gateway.page.page_settings import PageSettings
 
 DEFAULT = "127.0.0.1:8080"
 
@@ -69,8 +69,8 @@ def page_settings(asked: PageRequest) -> PageSettings | None:
             raise ConfigurationError("page-tls, page-passwords: expected --page with them")
         return None
     check_installed("starlette", "uvicorn")
+    from groundstation.gateway.page.page_settings import PageSettings, check_certificate, parse_address
     from groundstation.gateway.page.passwords import read_passwords
-    from groundstation.gateway.page.settings import PageSettings, check_certificate, parse_address
 
     host, port = parse_address(page)
     is_insecure = click.get_current_context().meta.get(INSECURE, False)

@@ -11,10 +11,9 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from telemetry.frozen import quickly_made
+from telemetry.frozen import Frozen, field
 
 SCHEMA_VERSION = 5  # the newest; a payload carries the earliest that can say it
 ENCODER = 0
@@ -90,9 +89,7 @@ class UploadPhase(enum.IntEnum):
     UNTRUSTED = 4  # this segment was not made with the key of the rig
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class Aiding:
+class Aiding(Frozen):
     """The yaw reference on its way down. ``yaw`` is the measurement, passed on unchanged by the scheme ``forward``.
 
     The yaw of the receiver is ``yaw + offset`` (make-up angles of the joints passed so far), with the independent
@@ -115,9 +112,7 @@ class Aiding:
     seal: bytes = b""  # of the measurement, under a key of the rig; empty without keys
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class Hello:
+class Hello(Frozen):
     """Who is at the other end of this joint."""
 
     tube: int
@@ -127,17 +122,13 @@ class Hello:
     link_quality: float  # 0..1, share of this side's frames lately acknowledged or expected and received
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class TimeRequest:
+class TimeRequest(Frozen):
     """First half of a two-way time exchange over one joint."""
 
     asked_at: float  # s, clock of the asker
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class TimeReply:
+class TimeReply(Frozen):
     """Second half of the exchange: the neighbour tells its own clock, and what it knows of rig time."""
 
     asked_at: float  # s, clock of the asker, echoed
@@ -149,9 +140,7 @@ class TimeReply:
     epoch: int = EPOCH_UNKNOWN  # of rig_at
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class NodeState:
+class NodeState(Frozen):
     """A node's account of itself, best effort, latest wins."""
 
     tube: int
@@ -179,18 +168,14 @@ class NodeState:
     lower_margin: float = math.inf  # dB, the same from below
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class ImuMean:
-    """Mean specific force of one IMU over the moving average of a stop, body frame, calibrated."""
+class ImuMean(Frozen, array_like=True):
+    """Mean specific force of one IMU over the moving average of a stop, body frame, calibrated; a list on the wire."""
 
     force: Vector3  # m/s^2
     force_cov: Matrix3  # (m/s^2)^2, covariance of the mean
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class SurveyMeasurement:
+class SurveyMeasurement(Frozen):
     """One cluster at one stop. ``(tube, sequence)`` is its identity; kept by the tube until a ``Receipt`` came."""
 
     tube: int
@@ -207,9 +192,7 @@ class SurveyMeasurement:
     epoch: int = EPOCH_UNKNOWN
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class Receipt:
+class Receipt(Frozen):
     """The ground station stored the message ``(tube, sequence)`` of this content; the tube may forget that one."""
 
     tube: int
@@ -217,9 +200,7 @@ class Receipt:
     content: bytes = b""  # hash of the payload, ``telemetry.presentation.content``
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class Command:
+class Command(Frozen):
     """An order to one node, acknowledged by a ``Reply`` with the same ``sequence`` (unique per ground station)."""
 
     tube: int  # addressee
@@ -228,9 +209,7 @@ class Command:
     arguments: dict[str, Scalar] = field(default_factory=dict)
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class Reply:
+class Reply(Frozen):
     """Outcome of a command. ``values`` came with schema version 3."""
 
     tube: int  # who answers
@@ -240,9 +219,7 @@ class Reply:
     values: dict[str, Value] = field(default_factory=dict)  # what the table of commands promises
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class Event:
+class Event(Frozen):
     """Something that happened. Shares the sequence with survey measurements and is acknowledged the same way."""
 
     tube: int
@@ -254,9 +231,7 @@ class Event:
     epoch: int = EPOCH_UNKNOWN
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class BlockSegment:
+class BlockSegment(Frozen):
     """One part of a parameter block on its way to a node, answered by a ``BlockStatus``."""
 
     tube: int  # addressee
@@ -269,9 +244,7 @@ class BlockSegment:
     tag: bytes  # HMAC-SHA256 under the rig's key of all the above
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class BlockStatus:
+class BlockStatus(Frozen):
     """A node's account of an upload, and of the block that it uses meanwhile."""
 
     tube: int
@@ -284,9 +257,7 @@ class BlockStatus:
     detail: str
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class StaticRecord:
+class StaticRecord(Frozen):
     """Raw readings averaged at rest, before any correction. Kept and receipted like a survey measurement."""
 
     tube: int
@@ -304,10 +275,8 @@ class StaticRecord:
     epoch: int = EPOCH_UNKNOWN
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class Stand:
-    """The bit stood at one depth."""
+class Stand(Frozen, array_like=True):
+    """The bit stood at one depth; a list on the wire."""
 
     epoch: int
     begun_at: float  # s, rig time
@@ -315,9 +284,7 @@ class Stand:
     md: float  # m
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class DepthReading:
+class DepthReading(Frozen):
     """Depth of the bit, from the rig to the ground station on a key of its own.
 
     Every reading repeats the last stands of the bit, so a ground station that was off can place what came meanwhile.
@@ -330,9 +297,7 @@ class DepthReading:
     epoch: int = EPOCH_UNKNOWN  # a source that does not know it is taken to mean the present one
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class SessionOffer:
+class SessionOffer(Frozen):
     """The base offers a session to a tube whose seals it does not know; the numbers are in its own seal."""
 
     tube: int  # addressee

@@ -14,6 +14,7 @@ from served import Served, serving
 
 from borechain.client import (
     Alarm,
+    AnsweredVerdict,
     AnswerError,
     Ground,
     NoAnswerError,
@@ -22,13 +23,13 @@ from borechain.client import (
     RefusedError,
     Station,
     Steer,
-    Verdict,
-    connect,
+    connect_to_ground,
     live_rigs,
-    shaped,
+    shape_answer,
 )
-from groundstation.gateway.page.settings import PageSettings
-from groundstation.service.answers import key_fields
+from groundstation.gateway.page.page_settings import PageSettings
+from groundstation.service.answers.answer_table import ANSWERS
+from groundstation.service.answers.shapes.answer_fields import Fields, fields_of_answer
 from telemetry.media.zenoh_bus import open_client
 
 pytestmark = pytest.mark.slow
@@ -48,30 +49,32 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 @pytest.fixture
 def ground(served: Served) -> Iterator[Ground]:
-    with connect(served.endpoint, timeout=10.0) as ground:
+    with connect_to_ground(served.endpoint, timeout=10.0) as ground:
         yield ground
 
 
 @pytest.mark.parametrize(
     ("shape", "answer"),
     [
-        (Verdict, (*key_fields.HEADER, *key_fields.VERDICT)),
-        (Alarm, key_fields.CREW_ALARM),
-        (Station, key_fields.STATION),
-        (Order, key_fields.ORDER),
+        (AnsweredVerdict, ANSWERS["verdict"].fields),
+        (Alarm, fields_of_answer(Alarm)),
+        (Station, fields_of_answer(ANSWERS["stations/{n}"].shape)),
+        (Order, fields_of_answer(ANSWERS["orders/{n}"].shape)),
     ],
 )
-def test_every_type_has_only_fields_that_its_key_promises(shape: type, answer: key_fields.Fields) -> None:
+def test_every_type_has_only_fields_that_its_key_promises(shape: type, answer: Fields) -> None:
     promised = {field.name: field for field in answer}
     assert {field.name for field in dataclasses.fields(shape)} <= promised.keys()
     for name, part in (("off", Off), ("steer", Steer)):
-        if shape is Verdict:
+        if shape is AnsweredVerdict:
             assert [field.name for field in dataclasses.fields(part)] == [f.name for f in promised[name].fields]
 
 
 def test_answers_have_their_types(ground: Ground) -> None:
     verdict = ground.verdict()
     assert verdict.by_surveys == "steer"
+    assert (type(verdict), type(verdict.off), type(ground.alarms()[0])) == (AnsweredVerdict, Off, Alarm)
+    assert verdict.utc.endswith("+00:00")
     assert verdict.off is not None
     assert verdict.off.wind == "N"
     assert [station.md_m for station in ground.stations()] == [2.0, 4.0, 6.0]
@@ -109,7 +112,7 @@ def test_another_rig_is_told_which_live(served: Served) -> None:
 
 def test_an_answer_of_an_older_ground_station_is_named() -> None:
     with pytest.raises(AnswerError, match="Steer: the answer lacks wind, before_md_m, left_m"):
-        shaped(Steer, {"azimuth_deg": 1.0})
+        shape_answer(Steer, {"azimuth_deg": 1.0})
 
 
 def lines_of(*words: str | Path) -> list[str]:

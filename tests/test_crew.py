@@ -12,8 +12,8 @@ import pytest
 from hand_fed import Rig
 from served import Served, serving
 
-from borechain.client import Ground, connect
-from borechain.crew import panels
+from borechain.client import Ground, connect_to_ground
+from borechain.crew import screen_panels
 from borechain.crew.app import CrewApp
 from borechain.crew.picture import Picture, View
 
@@ -81,7 +81,7 @@ def drift(rig: Rig) -> None:
 
 async def test_from_the_alarm_to_the_right_answers_with_one_key(served: Served) -> None:
     """Which hole, how deep, which way, what to do: on the screen with the alarm; one key acknowledges it."""
-    with connect(served.endpoint, timeout=10.0) as ground:
+    with connect_to_ground(served.endpoint, timeout=10.0) as ground:
         app = CrewApp(ground, "rig-1", "anna", Clock())
         async with app.run_test(size=SIZE) as pilot:
             text = await until(app, served, lambda text: "ON TARGET" in text and "MD 6.0/20.0 m" in text)
@@ -122,7 +122,7 @@ async def test_what_the_bus_has_dropped_is_asked_for(tmp_path: Path) -> None:
     rig = Rig(tmp_path, target=20.0)
     for stop in range(1, 4):
         rig.drill(stop, 0.3)
-    with serving(rig) as served, connect(served.endpoint, timeout=10.0) as ground:
+    with serving(rig) as served, connect_to_ground(served.endpoint, timeout=10.0) as ground:
         app = CrewApp(Lossy(ground, {"alarms", "orders", "status"}), "rig-1", "anna", Clock())
         async with app.run_test(size=SIZE):
             await app.workers.wait_for_complete()  # every answer of the beginning has arrived
@@ -134,7 +134,7 @@ async def test_what_the_bus_has_dropped_is_asked_for(tmp_path: Path) -> None:
 
 async def test_a_ground_station_that_is_frozen_is_dont_know_and_not_green(served: Served) -> None:
     clock = Clock()
-    with connect(served.endpoint, timeout=10.0) as ground:
+    with connect_to_ground(served.endpoint, timeout=10.0) as ground:
         app = CrewApp(ground, "rig-1", "anna", clock)
         async with app.run_test(size=SIZE):
             await app.workers.wait_for_complete()  # every answer of the beginning has arrived
@@ -148,7 +148,7 @@ async def test_a_ground_station_that_is_frozen_is_dont_know_and_not_green(served
 
 
 async def test_without_a_ground_station_the_screen_says_so(served: Served) -> None:
-    with connect(served.endpoint, "rig-7", timeout=10.0) as ground:
+    with connect_to_ground(served.endpoint, "rig-7", timeout=10.0) as ground:
         app = CrewApp(ground, "rig-7", "anna", Clock())
         async with app.run_test(size=SIZE) as pilot:
             text = "\n".join(shown(app))
@@ -178,7 +178,7 @@ def test_the_chosen_alarm_is_in_sight_however_many_there_are() -> None:
         alarms={"revision": 1, "utc": "", "open": [alarm(n) for n in range(40)], "flood": True, "left_out": 9}
     )
     for chosen in (0, 3, 17, 39):
-        lines = panels.alarms(many, chosen, 5).plain.splitlines()
+        lines = screen_panels.alarms_panel(many, chosen, 5).plain.splitlines()
         assert len(lines) == 5
         assert lines[0].startswith("ALARMS 40 open  FLOOD, 9 more")
         assert [line for line in lines if line.startswith(">")] == [lines[1 + min(chosen, 3)]]
@@ -187,8 +187,8 @@ def test_the_chosen_alarm_is_in_sight_however_many_there_are() -> None:
 
 def test_a_long_string_shows_the_tubes_that_are_not_well() -> None:
     tubes = [{"tube": n, "md_m": None, "age_s": 0.5, "stale": n in (3, 40)} for n in range(50, 0, -1)]
-    lines = panels.string(picture(string={"revision": 1, "utc": "", "tubes": tubes})).plain.splitlines()
-    assert len(lines) == panels.PLAN_HEIGHT
+    lines = screen_panels.string_panel(picture(string={"revision": 1, "utc": "", "tubes": tubes})).plain.splitlines()
+    assert len(lines) == screen_panels.PLAN_HEIGHT
     assert lines[0].endswith("(50)")
     assert [int(line.split()[0]) for line in lines[1:3]] == [40, 3]
 
@@ -201,8 +201,8 @@ def test_the_joints_of_a_wall_stand_below_the_string_the_worst_first() -> None:
     found = picture(
         string={"revision": 1, "utc": "", "tubes": tubes}, wall={"revision": 1, "utc": "", "wall": wall}
     )  # fmt: skip
-    lines = panels.string(found).plain.splitlines()
-    assert len(lines) == panels.PLAN_HEIGHT
+    lines = screen_panels.string_panel(found).plain.splitlines()
+    assert len(lines) == screen_panels.PLAN_HEIGHT
     assert lines[-2:] == ["H3-H2 78 cm P(thin) 1", "H3-H4 91 cm P(thin) 2e-07"]
 
 
@@ -216,12 +216,12 @@ def test_every_line_fits_the_screen() -> None:
         orders={"revision": 1, "utc": "", "orders": []},
     )  # fmt: skip
     for part in (
-        panels.header(long, 0.0),
-        panels.verdict(long, 0.0),
-        panels.alarms(long, 0, 5),
-        panels.actions(long, 2),
+        screen_panels.header_panel(long, 0.0),
+        screen_panels.verdict_panel(long, 0.0),
+        screen_panels.alarms_panel(long, 0, 5),
+        screen_panels.actions_panel(long, 2),
     ):
-        assert max(map(len, part.plain.splitlines())) <= panels.WIDTH
+        assert max(map(len, part.plain.splitlines())) <= screen_panels.WIDTH
 
 
 def test_an_older_answer_does_not_replace_a_newer_one() -> None:

@@ -50,10 +50,13 @@ def test_the_tables_of_a_page_are_made_from_the_code(make_tables: ModuleType, pa
 
 
 def test_every_key_below_ground_has_its_fields(make_tables: ModuleType) -> None:
-    from telemetry.keys import GROUND, TABLE
+    from groundstation.service.answers.answer_table import known_keys
+    from telemetry.keys import GROUND
 
     below = {
-        key.template.removeprefix(GROUND.format(rig="{rig}", path="")) for key in TABLE if "/ground/" in key.template
+        key.template.removeprefix(GROUND.format(rig="{rig}", path=""))
+        for key in known_keys()
+        if "/ground/" in key.template
     }
     text = (DOCS / "keys.md").read_text()
     assert below == {line.strip("# `") for line in text.splitlines() if line.startswith("### `")}
@@ -115,3 +118,8 @@ def test_the_step_is_told_in_its_order() -> None:
     assert len(named) == 10
     assert -1 not in places
     assert places == sorted(places)
+
+
+def test_the_types_of_the_page_are_made_from_the_classes_of_the_answers() -> None:
+    made = script("make_page_types")
+    assert made.TYPES.read_text() == made.types_text(), "run python docs/make_page_types.py"

@@ -13,7 +13,7 @@ from textual.containers import Horizontal
 from textual.widgets import Static
 
 from borechain.client import ClientError
-from borechain.crew import panels
+from borechain.crew import screen_panels
 from borechain.crew.picture import PATHS, Picture, View
 from telemetry.errors import BorechainError
 
@@ -22,7 +22,7 @@ ALARM_ROWS, ACTION_ROWS = 5, 2
 SHELVED_FOR = 30  # min
 
 
-class Source(Protocol):
+class ScreenSource(Protocol):
     """What the screen needs of a ground station."""
 
     def ask(self, path: str, **parameters: object) -> View:
@@ -68,7 +68,7 @@ class CrewApp(App[None]):
 
     def __init__(
         self,
-        source: Source,
+        source: ScreenSource,
         rig: str,
         by: str,
         clock: Callable[[], float] = time.monotonic,
@@ -95,7 +95,7 @@ class CrewApp(App[None]):
             yield Static(id="string")
         yield Static(id="alarms")
         yield Static(id="actions")
-        yield Static(panels.fitted(self.HELP, panels.QUIET), id="help")
+        yield Static(screen_panels.fit_line(self.HELP, screen_panels.QUIET), id="help")
 
     def on_mount(self) -> None:
         """Follow the ground station from now on."""
@@ -118,13 +118,13 @@ class CrewApp(App[None]):
         picture = self.picture
         self._catch_up()
         for name, text in (
-            ("header", panels.header(picture, now)),
-            ("verdict", panels.verdict(picture, now)),
-            ("plan", panels.plan(picture)),
-            ("strip", panels.strip(picture)),
-            ("string", panels.string(picture)),
-            ("alarms", panels.alarms(picture, self._chosen, ALARM_ROWS)),
-            ("actions", panels.actions(picture, ACTION_ROWS)),
+            ("header", screen_panels.header_panel(picture, now)),
+            ("verdict", screen_panels.verdict_panel(picture, now)),
+            ("plan", screen_panels.plan_panel(picture)),
+            ("strip", screen_panels.strip_panel(picture)),
+            ("string", screen_panels.string_panel(picture)),
+            ("alarms", screen_panels.alarms_panel(picture, self._chosen, ALARM_ROWS)),
+            ("actions", screen_panels.actions_panel(picture, ACTION_ROWS)),
         ):
             self.query_one(f"#{name}", Static).update(text)
 

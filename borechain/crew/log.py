@@ -14,7 +14,7 @@ View = dict[str, Any]
 FOLLOWED = ("measurements", "alarms", "verdict", "wall")
 
 
-class Told(Protocol):
+class DrillingState(Protocol):
     """What a medium tells while it drills."""
 
     @property
@@ -73,7 +73,7 @@ class RunLog:
         self._joints.clear()
         self._line("hole", name)
 
-    def on_tick(self, tick: Told, restarts: Mapping[str, int]) -> bool:
+    def on_tick(self, tick: DrillingState, restarts: Mapping[str, int]) -> bool:
         """Take the rig's progress and how often each process was started again; whether a phase began."""
         self._elapsed = tick.rig_time - tick.begin
         for name, count in restarts.items():

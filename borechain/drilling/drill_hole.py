@@ -13,7 +13,7 @@ from borechain.crew.log import RunLog
 from borechain.drilling.inline import InlineRig
 from borechain.drilling.rig_job import DrilledRig, RigJob, RigRun, RigWatcher, ShowProgress, say_on_stderr
 from borechain.drilling.rig_processes import drill_in_processes, process_table, settings_of
-from groundstation.gateway.page.settings import PageSettings
+from groundstation.gateway.page.page_settings import PageSettings
 from sim.errors import RigError, ScenarioError
 from sim.rig.ground_answers import ASKED
 from sim.rig.launcher import next_run_folder, prepare_folder

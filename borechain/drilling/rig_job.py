@@ -14,7 +14,7 @@ from telemetry import keys
 
 if TYPE_CHECKING:
     from borechain.crew.log import RunLog
-    from groundstation.gateway.page.settings import PageSettings
+    from groundstation.gateway.page.page_settings import PageSettings
     from sim.rig.launcher import Tick
     from sim.rig.scheduler import Progress
     from sim.world.world import World

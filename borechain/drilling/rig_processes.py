@@ -11,7 +11,7 @@ from typing import Any
 from borechain.crew.log import RunLog
 from borechain.drilling.rig_host import run_medium
 from borechain.drilling.rig_job import RigJob, RigRun, ShowProgress
-from groundstation.gateway.page.settings import PageSettings
+from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.host import run_ground
 from node.process.node_host import run_encoder, run_node
 from sim.rig.ground_answers import ask_surveys, get_json, selector_of

@@ -7,7 +7,6 @@ import json
 import socket
 import time
 import urllib.request
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,12 +17,13 @@ from borechain.load.page import ASK_EVERY_S, GROUND, HEARD_WITHIN_S, RIG, ROUNDI
 from borechain.load.patience import wait_for
 from borechain.load.readers import CONNECT_S, read_lines
 from groundstation.config import checked_config
-from groundstation.gateway.page.settings import PageSettings
+from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.host import run_ground
 from groundstation.service.disk.ground_store import Store, Stored
 from sim.errors import RigError
 from sim.rig.processes import ProcessTable, Spec
 from sim.rig.realtime import cpu_seconds, footprint, pids
+from telemetry.frozen import replace
 from telemetry.media.zenoh_bus import open_router
 from telemetry.messages import Stand, SurveyMeasurement
 from telemetry.runtime.hosting import Place

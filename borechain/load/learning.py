@@ -11,7 +11,7 @@ import itertools
 import time
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from groundstation.host import started
 from groundstation.recording.ground_replay import TapeClock
 from sim.errors import RigError
 from telemetry.application.depth_source import DepthSource
+from telemetry.frozen import replace
 from telemetry.messages import SurveyMeasurement
 from telemetry.presentation.msgpack_codec import encode
 

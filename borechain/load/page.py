@@ -18,7 +18,7 @@ from borechain.client import Ground, NoAnswerError
 from borechain.load.crowd import DRILLING_S, ROUND_S, TUBE_LENGTH, Crowd, crowd_in_thread
 from borechain.load.patience import wait_for
 from borechain.load.readers import BARE, CONNECT_S, answer_nothing, follow_keys, follow_page
-from groundstation.gateway.page.settings import PageSettings
+from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.host import run_ground
 from sim.rig.processes import ProcessTable, Spec
 from sim.rig.realtime import cpu_seconds, footprint, pids

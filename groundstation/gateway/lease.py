@@ -30,22 +30,22 @@ def take_lease(bus: ZenohBus, rig: str) -> None:
     deadline = time.monotonic() + PATIENCE
     while others := bus.tokens(keys.LEASE.format(rig=rig, holder="*"), ASK_TIMEOUT):
         if time.monotonic() >= deadline:
-            raise LeaseError(refusal(rig, others[0]))
+            raise LeaseError(lease_refusal(rig, others[0]))
         time.sleep(ASK_EVERY)
-    own = keys.LEASE.format(rig=rig, holder=holder())
+    own = keys.LEASE.format(rig=rig, holder=holder_name())
     bus.liveliness_token(own)
     first = min([own, *bus.tokens(keys.LEASE.format(rig=rig, holder="*"), ASK_TIMEOUT)])
     if first != own:
-        raise LeaseError(refusal(rig, first))
+        raise LeaseError(lease_refusal(rig, first))
 
 
-def holder() -> str:
+def holder_name() -> str:
     """Name of this ground station, the older the smaller: its start, its machine and its process."""
     machine = "".join(c if c.isalnum() else "-" for c in socket.gethostname())[:40] or "unnamed"
     return f"{time.time_ns():020d}_{machine}_{os.getpid()}_{secrets.token_hex(4)}"
 
 
-def refusal(rig: str, token: str) -> str:
+def lease_refusal(rig: str, token: str) -> str:
     """Why a second ground station is refused, by the token of the first."""
     _, machine, process, _ = token.rsplit("/", 1)[1].split("_")
     return f"rig {rig}: process {process} on {machine} is its ground station; end that one, or choose another --rig"

@@ -13,17 +13,10 @@ import msgpack
 import orjson
 
 from groundstation.errors import GroundError, SelectorError
+from groundstation.service.answers.answer_table import LONGEST_NUMBER, PATTERNS, find_answer
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.paths import (
-    LONGEST_NUMBER,
-    PATTERNS,
-    Path,
-    check_parameters,
-    find,
-    is_of_the_hole,
-    paths,
-)
-from groundstation.service.answers.views import Parameters
+from groundstation.service.answers.paths import AnsweredPath, answered_paths, check_parameters, find_path
+from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.orders.order_book import Order
 from groundstation.service.process.ground_process import BEATS, GroundProcess
 from groundstation.service.process.intake_tape import BEGIN, Intake, pack_intake
@@ -87,7 +80,7 @@ class ZenohGateway:
             handle(query)
         except Exception as error:
             self._process.endpoint.counters["failed_queries"] += 1
-            refuse(query, f"{query.selector_key}: the ground station failed: {type(error).__name__}")
+            refuse_query(query, f"{query.selector_key}: the ground station failed: {type(error).__name__}")
 
     def close(self) -> None:
         """Publish what is left and answer nothing more; from the loop or a signal handler of it."""
@@ -99,7 +92,7 @@ class ZenohGateway:
     def _arrive(self, handle: Handler, query: Query) -> None:
         """Queue a query, on a thread of the bus."""
         if not self._inbox.put((handle, query)):
-            refuse(query, BUSY)
+            refuse_query(query, BUSY)
 
     def _key(self, path: str) -> str:
         return keys.GROUND.format(rig=self._rig, path=path)
@@ -110,7 +103,7 @@ class ZenohGateway:
         What shows the whole hole is put one path a turn of the loop: a query meanwhile waits for one of them at most.
         """
         self._publish_intake()
-        late = dict.fromkeys(path for path in changed if is_of_the_hole(path))
+        late = dict.fromkeys(path for path in changed if find_answer(path).of_the_hole)
         for path in changed:
             if path not in late:
                 self._put(path)
@@ -154,7 +147,7 @@ class ZenohGateway:
         """Answer a recorder with the kept events after number ``since``."""
         since = query.parameters.get("since", "0")
         if not since.isdecimal() or len(since) > LONGEST_NUMBER:
-            refuse(query, f"parameter since: expected a whole number, got {since!r:.40}")
+            refuse_query(query, f"parameter since: expected a whole number, got {since!r:.40}")
             return
         events = list(self._process.tape.after(min(int(since), self._process.tape.newest)))[:INTAKE_AT_ONCE]
         query.reply(query.selector_key, bytes(msgpack.packb([pack_intake(event) for event in events])), MSGPACK)
@@ -162,7 +155,7 @@ class ZenohGateway:
 
     def _news(self, path: str) -> bytes:
         """Answer to publish: of a stream the rows that have come since the last one."""
-        model, found = self._process.model, find(self._process.model, path)
+        model, found = self._process.model, find_path(self._process.model, path)
         if not found.is_stream:
             return found.json(model, {})
         since, self._told[path] = self._told.get(path, 0), model.seen[path]
@@ -172,7 +165,7 @@ class ZenohGateway:
         try:
             replies = self._replies(query)
         except SelectorError as error:
-            refuse(query, str(error))
+            refuse_query(query, str(error))
             return
         encoding = ENCODINGS[query.parameters.get("accept", "json")]
         for key, payload in replies:
@@ -181,10 +174,10 @@ class ZenohGateway:
 
     def _replies(self, query: Query) -> list[tuple[str, bytes]]:
         model = self._process.model
-        found = {path: one for path, one in paths(model).items() if query.intersects(self._key(path))}
+        found = {path: one for path, one in answered_paths(model).items() if query.intersects(self._key(path))}
         path = query.selector_key.partition("/ground/")[2]
         if not found and path and "*" not in path:
-            find(model, path)  # which says what there is in its place
+            find_path(model, path)  # which says what there is in its place
         if not found:
             raise SelectorError(
                 f"{query.selector_key}: no such key; expected below {self._key('')}: {', '.join(PATTERNS)}"
@@ -194,13 +187,13 @@ class ZenohGateway:
             raise SelectorError(f"parameter accept: expected json or msgpack, got {accept!r}")
         parameters = {name: value for name, value in query.parameters.items() if name not in COMMON_PARAMETERS}
         check_parameters(found.values(), parameters, COMMON_PARAMETERS)
-        pack = msgpack_of if accept == "msgpack" else Path.json
+        pack = msgpack_of if accept == "msgpack" else AnsweredPath.json
         return [(self._key(path), pack(one, model, parameters)) for path, one in found.items()]
 
     def _take_order(self, query: Query) -> None:
         """Accept an order; its answer is awaited beside all other work."""
         if len(self._awaited) >= WAITING:
-            refuse(query, BUSY)
+            refuse_query(query, BUSY)
             return
         if not keys.is_order(query.selector_key):
             query.finish()  # a question that covers every key orders nothing
@@ -209,7 +202,7 @@ class ZenohGateway:
         try:
             order = self._operator.order(name, query.parameters, query.parameters.get("by", WHO))
         except (GroundError, TelemetryError) as error:
-            refuse(query, f"{query.selector_key}: {error}")
+            refuse_query(query, f"{query.selector_key}: {error}")
             return
         task = asyncio.create_task(self._reply_when_answered(query, order))
         self._awaited.add(task)
@@ -223,7 +216,7 @@ class ZenohGateway:
             async with asyncio.timeout(ORDER_TIMEOUT):
                 await answered.wait()
         except TimeoutError:
-            refuse(
+            refuse_query(
                 query,
                 f"order {order.number}: tube {order.tube} has not answered {name} within {ORDER_TIMEOUT:.0f} s; "
                 f"it is still being asked, see {self._key(f'orders/{order.number}')}",
@@ -234,12 +227,12 @@ class ZenohGateway:
             query.finish()
 
 
-def refuse(query: Query, reason: str) -> None:
+def refuse_query(query: Query, reason: str) -> None:
     """End a query with what is wrong with it."""
     query.reply_error(reason)
     query.finish()
 
 
-def msgpack_of(path: Path, model: RigModel, parameters: Parameters) -> bytes:
+def msgpack_of(path: AnsweredPath, model: RigModel, parameters: Parameters) -> bytes:
     """The answer of a path in msgpack."""
     return bytes(msgpack.packb(path.show(model, parameters)))

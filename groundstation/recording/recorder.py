@@ -12,7 +12,7 @@ from pathlib import Path
 import msgpack
 
 from groundstation.recording.recording_file import RecordedSample, RecordingWriter
-from groundstation.service.answers.paths import schemas
+from groundstation.service.answers.answer_table import schemas_by_path
 from groundstation.service.process.intake_tape import BEGIN, IntakeError, unpack_intake
 from telemetry import keys
 from telemetry.media.zenoh_bus import ZenohBus
@@ -51,7 +51,7 @@ class Recorder:
         self.course = RecordingSummary()
         self._bus = bus
         self._arrived: queue.Queue[RecordedSample | None] = queue.Queue(WAITING)
-        shown = {pattern: json.dumps(schema).encode() for pattern, schema in schemas().items()}
+        shown = {pattern: json.dumps(schema).encode() for pattern, schema in schemas_by_path().items()}
         self._writer = RecordingWriter(path, rig, shown)
         self._intake = keys.INTAKE.format(rig=rig)
         for key in (keys.GROUND.format(rig=rig, path="**"), keys.DEPTH.format(rig=rig), self._intake):

@@ -7,7 +7,7 @@ import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from groundstation.gateway.page.settings import PageSettings
+from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.host import page_of
 from groundstation.recording.ground_replay import Replayed, open_replay
 from groundstation.recording.recording_file import Recording

@@ -7,7 +7,6 @@ Where inside a count the head stopped the times of its last edges say, if they w
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,15 +14,13 @@ from node.firmware.edge_interpolation import stopped_at
 from node.firmware.torque import TorqueSettings, drive_record
 from node.kernels.record.node_record import A_RATE, A_TORQUE, A_VALID, A_YAW, A_YAW_VAR, AIDING
 from node.kernels.string.encoder_step import BEYOND, BEYOND_VAR, EDGE_STD, QUANTUM, SAMPLE, encoder_step, new_encoder
-from telemetry.frozen import quickly_made
+from telemetry.frozen import Frozen
 from telemetry.messages import EPOCH_UNKNOWN, Aiding
 
 STOP_STD = 1.5 * EDGE_STD / QUANTUM  # counts; the form of a stop is not exactly a power of time
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class EncoderSample:
+class EncoderSample(Frozen):
     """One reading of the counter."""
 
     count: int  # since the counter was started

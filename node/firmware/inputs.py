@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from node.kernels.sensors.correction import USUAL
-from telemetry.frozen import quickly_made
+from telemetry.frozen import Frozen
 from telemetry.messages import EPOCH_UNKNOWN
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class ImuReading:
+class ImuReading(Frozen):
     """Mean of one cycle as the sensor gives it, before any correction, on the node's own clock."""
 
     start: float  # s
@@ -28,9 +24,7 @@ class ImuReading:
     others: tuple[ImuReading, ...] = ()  # of the further IMUs of a cluster, in the same cycle
 
 
-@quickly_made
-@dataclass(frozen=True, slots=True)
-class RigContext:
+class RigContext(Frozen):
     """What the firmware gets from the telemetry at a cycle: its place in the string and the time."""
 
     joined: bool  # the upper joint is closed

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.angles import from_binary, wrap_angle
 from node.kernels.arithmetic.formats import DEG, Array
 from node.kernels.record.filter_record import Err
+from telemetry.frozen import replace
 from telemetry.messages import (
     Aiding,
     Event,

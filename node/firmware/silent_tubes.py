@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from node.firmware.tube_settings import MakeUpAngle, PassedTube
 from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.string.twist import reaching_var
+from telemetry.frozen import replace
 from telemetry.messages import Aiding
 
 

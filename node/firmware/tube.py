@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -39,6 +38,7 @@ from node.kernels.step.node_step import (
     is_standing,
 )
 from node.kernels.string.twist import twist_var
+from telemetry.frozen import replace
 from telemetry.messages import (
     Aiding,
     Event,

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
 
 from node.firmware.block_trial import Trial, TrialVerdict, refusal_reason, unfit_reason
 from node.firmware.inputs import ImuReading
 from node.firmware.tube import Tube
 from node.process.block_store import BlockStore
 from telemetry.errors import DecodeError
+from telemetry.frozen import replace
 from telemetry.messages import BlockSegment, BlockStatus, Scalar, Severity, UploadPhase
 from telemetry.parameters import ParameterBlock, unpack_block
 from telemetry.transport.authentication import is_authentic

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 from node.firmware.inputs import ImuReading
@@ -11,6 +10,7 @@ from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import PARTS
 from node.kernels.sensors.correction import USUAL
 from node.process.drivers.source import NOTHING, ImuSample
+from telemetry.frozen import replace
 
 LEAST, MOST = 6, 10  # numbers of an IMU that does not tell the parts of its cycle
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +31,7 @@ from node.process.survey_log import SurveyLog
 from telemetry.application.endpoint import REPORT_EVERY, Endpoint
 from telemetry.application.seal_watch import SealWatch
 from telemetry.errors import EncodeError
+from telemetry.frozen import replace
 from telemetry.messages import (
     EPOCH_UNKNOWN,
     Aiding,

@@ -24,6 +24,7 @@ from node.kernels.arithmetic.jit import source_digest
 from node.process.drivers import frame_clock
 from sim.campaign.chunk import EPOCH_COLUMNS, RUNS, SURVEY_COLUMNS, Chunk, Columns
 from sim.errors import RigError
+from sim.kernel import ROOMS
 
 VERSION: Final = 1
 MANIFEST: Final = "campaign.json"
@@ -165,10 +166,9 @@ def write_whole(file: Path, content: bytes) -> None:
 
 
 def code_digest() -> str:
-    """Digest of everything that decides what a run gives: kernels, the world that draws for them, and the driver."""
+    """Digest of everything that decides what a run gives: kernels, the world and its string, and the driver."""
     digest = hashlib.sha256(source_digest().encode())
-    here = Path(__file__).parents[1]
-    driver = Path(frame_clock.__file__)
-    for source in sorted([*(here / "world").rglob("*.py"), *(here / "campaign").glob("*.py"), driver]):
+    sources = [source for room in (*ROOMS, Path(__file__).parent) for source in room.rglob("*.py")]
+    for source in sorted([*sources, Path(frame_clock.__file__)]):
         digest.update(source.name.encode() + source.read_bytes())
     return digest.hexdigest()[:16]

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.campaign.chunk import Columns
-from sim.rig.direct_string import wrapped
+from sim.string.result import wrap_angles
 
 Array = npt.NDArray[np.float64]
 INTERVAL: Final = 1.959963984540054  # sigma, of 95 % of normal errors
@@ -121,7 +121,7 @@ def honesty(chunks: Iterable[Columns]) -> list[dict[str, Any]]:
     """NEES and coverage at every hop, at rest and turning, of nodes that know their yaw."""
     found: dict[Any, dict[str, OverRuns]] = groups()
     for epochs in chunks:
-        random = wrapped(epochs["yaw_error"] - epochs["systematic_error"])
+        random = wrap_angles(epochs["yaw_error"] - epochs["systematic_error"])
         total = epochs["yaw_error"] ** 2 / (epochs["yaw_var"] + epochs["systematic_var"])
         for turning in (False, True):
             for hop in np.unique(epochs["hop"]).tolist():

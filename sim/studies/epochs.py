@@ -16,7 +16,7 @@ import numpy.typing as npt
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Scheme
 from sim.campaign.chunk import campaign_of
-from sim.rig.direct_string import DirectString
+from sim.string.direct_string import DirectString
 from sim.studies.lab import ACCELERATION_DPS2, RATE_DPS, TURNS
 from sim.studies.scenarios import CALIBRATED, Tables, complete_string
 from sim.world.scenario import scenario_of

@@ -17,7 +17,8 @@ import numpy.typing as npt
 from groundstation.survey.fusion.resolve import direction_angles, resolve_direction
 from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.arithmetic.formats import PERIOD
-from sim.rig.direct_string import DirectString, StringRun, wrapped
+from sim.string.direct_string import DirectString
+from sim.string.result import StringRun, wrap_angles
 from sim.studies.scenarios import Tables, complete_string
 from sim.world.motion import Trapezoid
 from sim.world.scenario import scenario_of
@@ -99,7 +100,7 @@ def errors_by_hop(world: World, run: StringRun) -> LabRun:
 def _azimuth_of_rest(world: World, run: StringRun, tube: int) -> float:
     force = world.sensors.samples(tube)[REST, 3:6]
     yaw = run.yaw[REST, tube - 1]
-    mean = float(yaw[0] + np.mean(wrapped(yaw - yaw[0])))
+    mean = float(yaw[0] + np.mean(wrap_angles(yaw - yaw[0])))
     return _azimuth(force.mean(axis=0), np.cov(force.T) / len(force), mean, float(run.var[REST, tube - 1].mean()))
 
 

@@ -18,7 +18,6 @@ from sim.world.marks import Marks
 from sim.world.motion import Motion, Phase, Trapezoid
 from sim.world.rack import Rack
 from sim.world.rough_run import RoughRun
-from sim.world.rough_section import RoughSection
 from sim.world.rough_truth import RoughTruth
 from sim.world.scenario import Scenario
 from sim.world.streams import Stream, stream
@@ -123,8 +122,7 @@ class DrillString:
     @cached_property
     def rough_run(self) -> RoughRun:
         """What the table ``rough`` makes of this run."""
-        section = self.scenario.file.rough or RoughSection()
-        return RoughRun(section, self.motion, self.begin, self.seed, self.disc.errors)
+        return RoughRun(self.scenario.file, self.motion, self.begin, self.seed, self.disc.errors)
 
     def _rough_truth(self, tube: int, *given: Any) -> RoughTruth:
         if tube not in self._rough_truths:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import cached_property
 
@@ -10,17 +9,17 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.world.borehole import Borehole
-from sim.world.imu_errors import ImuErrors
+from sim.world.disturbance.reading import move_tube
+from sim.world.disturbance.row import OneImu, TubeMotion
 from sim.world.motion import Motion
 from sim.world.rough_disc import RoughDisc
-from sim.world.rough_imu import RoughImu, shaken_angle
 from sim.world.rough_motion import RoughMotion
 from sim.world.rough_section import RoughSection
 from sim.world.rough_truth import RoughTruth, transported
-from sim.world.truth import TubeTruth, Twist
+from sim.world.scenario_file import ScenarioFile
+from sim.world.truth import Twist
 
 Array = npt.NDArray[np.float64]
-EARTH = 7.292115e-5  # rad/s. Source: WGS 84, NGA.STND.0036
 
 
 class RoughRun:
@@ -28,17 +27,17 @@ class RoughRun:
 
     Parameters
     ----------
-    section : of the scenario
+    file : of the scenario
     motion : the schedule
     begin : s, rig time of the start
     seed : of the run
     line_errors : (counts,) rad, of the places of the encoder's lines
     """
 
-    def __init__(self, section: RoughSection, motion: Motion, begin: float, seed: int, line_errors: Array) -> None:
-        self._section, self._schedule = section, motion
+    def __init__(self, file: ScenarioFile, motion: Motion, begin: float, seed: int, line_errors: Array) -> None:
+        self._file, self._section, self._schedule = file, file.rough or RoughSection(), motion
         self._begin, self._seed, self._line_errors = begin, seed, line_errors
-        self.moved = RoughMotion(section, motion, begin, seed)
+        self.moved = RoughMotion(self._section, motion, begin, seed)
 
     @cached_property
     def disc(self) -> RoughDisc:
@@ -60,27 +59,10 @@ class RoughRun:
         """Perfect sensor of a tube; what it is given is as ``TubeTruth`` takes it."""
         section, moved = self._section, self.moved
         angle = moved.string - moved.twist(section.string)
-        angle = angle + shaken_angle(section.vibration, self._seed, tube, moved.t, moved.driven)
+        angle = move_tube(TubeMotion(moved.t, angle, moved.driven), OneImu(self._file, self._seed, tube))
         if twist is not None:
             angle = angle - twist(moved.t)[0]
         if section.string.transport == "parallel":
             reached = np.maximum(self._schedule.depth(moved.t)[0] - below, 0.0)
             angle = angle + transported(hole, reached)
         return RoughTruth(moved.t, angle, hole, self._schedule, below, joint_angle, radius, gravity, None, unseen)
-
-    def perfect(self, truth: TubeTruth, frame: Array) -> tuple[Array, Array]:
-        """Rates and forces (n, 3) on the grid in the frame of an IMU (3, 3), rad/s and m/s^2."""
-        rate, force = truth.rate_and_force(self.moved.t)
-        if self._section.latitude_deg is not None:
-            rate = rate + earth_rate(self._section.latitude_deg, truth.attitude(self.moved.t))
-        return rate @ frame.T, force @ frame.T
-
-    def imu(self, errors: ImuErrors, tube: int, imu: int) -> RoughImu:
-        """One IMU of a tube."""
-        return RoughImu(self._section, errors, self._seed, tube, imu, self.moved.t, self.moved.driven)
-
-
-def earth_rate(latitude_deg: float, attitude: Array) -> Array:
-    """Rate (n, 3, rad/s) by which the earth turns a body of these attitudes, R_ned_from_body (n, 3, 3)."""
-    latitude = math.radians(latitude_deg)
-    return np.asarray(EARTH * np.array([math.cos(latitude), 0.0, -math.sin(latitude)]) @ attitude)

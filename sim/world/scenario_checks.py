@@ -8,6 +8,8 @@ import numpy as np
 
 from groundstation.calibration.attitudes import rank_of, true_vectors
 from sim.errors import ScenarioError
+from sim.world.disturbance.table import TABLE
+from sim.world.parsing import validate
 from sim.world.radio import check_radio
 from sim.world.scenario_file import AidingSection, CalibrationSection, ScenarioFile
 from telemetry.errors import RadioError
@@ -33,6 +35,7 @@ def check(path: Path, file: ScenarioFile) -> None:
     _check_rough(path, file)
     _check_node(path, file)
     _check_calibration(path, file.calibration)
+    _check_disturbances(path, file)
 
 
 def _check_motion(path: Path, file: ScenarioFile) -> None:
@@ -170,3 +173,14 @@ def _check_calibration(path: Path, section: CalibrationSection | None) -> None:
             f"{path}: calibration.attitudes_deg: expected attitudes that determine bias and matrix (rank 4), "
             f"got rank {rank}; add some of other tilts"
         )
+
+
+def _check_disturbances(path: Path, file: ScenarioFile) -> None:
+    """Every table below ``disturbance`` is of a row of the table of disturbances, with the keys of its section."""
+    sections = {row.name: row.section for row in TABLE if row.section is not None}
+    for name, table in file.disturbance.items():
+        section = sections.get(name)
+        if section is None:
+            known = ", ".join(sections) or "none"
+            raise ScenarioError(f"{path}: disturbance.{name}: no such disturbance has a table; expected one of {known}")
+        validate(Path(f"{path}: disturbance.{name}"), table, section, 1)

@@ -5,7 +5,7 @@ Degrees and milliseconds at this edge only.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
@@ -309,6 +309,9 @@ class ScenarioFile(Section):
         None, description="a wall whose holes are drilled one after the other, each straight in place of the path"
     )
     rough: RoughSection | None = Field(None, description="what a field does to the string; without this table nothing")
+    disturbance: dict[str, dict[str, Any]] = Field(
+        default_factory=dict, description="disturbances with a table of their own, see sim.world.disturbance"
+    )
     faults: tuple[str, ...] = ()
 
     @property

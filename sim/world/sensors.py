@@ -10,10 +10,14 @@ import numpy.typing as npt
 
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.sensors.correction import USUAL
+from sim.world.disturbance.bias_step import stepped_bias
+from sim.world.disturbance.drift import Drift, draw_drift
+from sim.world.disturbance.gyroscope import draw_gyroscope
+from sim.world.disturbance.mount_tilt import draw_tilt
+from sim.world.disturbance.reading import Cycles, read_eighths, read_grid, read_means
+from sim.world.disturbance.row import ImuSamples, OneImu
+from sim.world.disturbance.wander import wandering
 from sim.world.drill_string import DrillString
-from sim.world.imu_errors import Drift, ImuErrors, single_samples
-from sim.world.increments import borders_of, eighths
-from sim.world.rough_imu import Cycles
 from sim.world.streams import Stream, stream
 from sim.world.truth import imu_frame
 
@@ -69,59 +73,38 @@ class Sensors:
 
         The noise of the accelerometer is stated for one cycle, and so is larger over less.
         """
-        truth, file = self._string.truth(tube), self._file
+        truth, motion = self._string.truth(tube), self._string.motion
         rate, force = truth.cycle_means(ends, period)
-        gyroscope, accelerometer = file.gyroscope, file.accelerometer
-        if gyroscope.instantaneous:
-            rate, gyroscope = truth.rate(ends), single_samples(gyroscope, period)
-        if period != PERIOD:
-            noise_deg = accelerometer.noise_deg * math.sqrt(PERIOD / period)
-            accelerometer = accelerometer.model_copy(update={"noise_deg": noise_deg})
+        if self._file.gyroscope.instantaneous:
+            rate = truth.rate(ends)
         if (rack := self._string.rack) is not None:
             racked, mount = ends <= rack.end, self._string.marks.mounts[tube]
-            held = rack.truth(self._random(Stream.RACK, tube), mount, accelerometer.gravity_mps2)
+            random = stream(self._string.seed, Stream.RACK, tube)
+            held = rack.truth(random, mount, self._file.accelerometer.gravity_mps2)
             rate[racked], force[racked] = held.cycle_means(ends[racked], period)
-        frame = self.frame(tube, imu)
-        rate, force = rate @ frame.T, force @ frame.T
-        turning = (self._string.motion.drive(ends)[1] > 0.0) | (self._string.motion.drive(ends - period)[1] > 0.0)
-        rate[:, 2] += self._bias_step(ends)
-        felt = force
-        if (drift := self.drift(tube, imu)) is not None:
-            rate, felt = rate + drift.rate, force @ drift.matrix.T + drift.bias
-        errors = ImuErrors(gyroscope, accelerometer).times(self.noises[imu])
-        measured_rate = errors.gyro(self._random(Stream.GYRO, tube, imu), rate, force, period)
-        measured_force = errors.accelerations(
-            self._random(Stream.ACCELEROMETER, tube, imu), felt, turning.astype(float)
-        )
-        return np.concatenate([measured_rate, measured_force], axis=1)
+        turning = ((motion.drive(ends)[1] > 0.0) | (motion.drive(ends - period)[1] > 0.0)).astype(float)
+        samples = ImuSamples(ends, rate, force, turning, truth, ends, period)
+        return read_means(samples, self._imu(tube, imu))
 
     def rough_cycles(self, tube: int, imu: int = 0) -> Cycles:
         """Readings of a tube in a rough world, cycle by cycle, with temperature and what was clipped."""
-        rough = self._string.rough_run
         if (tube, imu) not in self._rough_cycles:
-            file, ends = self._file, self._ends(tube)
-            rate, force = rough.perfect(self._string.truth(tube), self.frame(tube, imu))
-            bias = np.zeros((len(ends), 3))
-            bias[:, 2] = self._bias_step(ends)
-            if (drift := self.drift(tube, imu)) is not None:
-                bias, force = bias + drift.rate, force @ drift.matrix.T + drift.bias
-            errors = ImuErrors(file.gyroscope, file.accelerometer).times(self.noises[imu])
-            self._rough_cycles[tube, imu] = rough.imu(errors, tube, imu).cycles(rate, force, ends, bias)
+            moved, truth, ends = self._string.rough_run.moved, self._string.truth(tube), self._ends(tube)
+            signal = ImuSamples(moved.t, *truth.rate_and_force(moved.t), moved.driven, truth, ends)
+            signal.clipped = np.zeros(len(moved.t), np.int64)
+            self._rough_cycles[tube, imu] = read_grid(signal, self._imu(tube, imu, cold_at=float(moved.t[0])))
         return self._rough_cycles[tube, imu]
 
     def gyro_bias(self, tube: int) -> Array:
-        """True bias (cycles,) of a tube's z gyroscope, rad/s: the draws of its readings without noise and scale."""
-        clean = {"noise_dps_rthz": (0.0, 0.0, 0.0), "scale_factor_std": 0.0, "resolution_dps": 0.0}
-        section = self._file.gyroscope.model_copy(update=clean)
-        still = np.zeros((self._string.cycles, 3))
-        errors = ImuErrors(section, self._file.accelerometer)
-        drawn = errors.gyro(self._random(Stream.GYRO, tube), still, still, PERIOD)[:, 2]
-        return np.asarray(drawn + self._bias_step(self._ends(tube)))
+        """True bias (cycles,) of a tube's z gyroscope, rad/s: what is constant, what wanders, and its step."""
+        imu, limit = self._imu(tube), math.radians(self._file.gyroscope.range_dps)
+        constant = draw_gyroscope(imu).bias[2]
+        drawn = np.clip(constant + wandering(imu, self._string.cycles, PERIOD)[:, 2], -limit, limit)
+        return np.asarray(drawn + stepped_bias(imu, self._ends(tube)))
 
     def drift(self, tube: int, imu: int = 0) -> Drift | None:
         """What became of a tube's sensors since their calibration."""
-        section = self._file.drift
-        return None if section is None else Drift.draw(section, self._random(Stream.DRIFT, tube, imu))
+        return draw_drift(self._imu(tube, imu))
 
     def frame(self, tube: int, imu: int = 0) -> Array:
         """R_imu_from_tube (3, 3): how an IMU (from 0) of a tube leans against the tube's axis."""
@@ -129,9 +112,7 @@ class Sensors:
 
     def tilt(self, tube: int, imu: int = 0) -> tuple[float, float]:
         """Pitch and roll (rad) of that lean."""
-        std = math.radians(self._file.joints.mount_tilt_std_deg)
-        pitch, roll = (std * self._random(Stream.MOUNTS, tube, imu).standard_normal(2)).tolist()
-        return pitch, roll
+        return draw_tilt(self._imu(tube, imu))
 
     def _sample(self, tube: int, cycle: int, imu: int) -> list[Any]:
         sample: list[Any] = self.samples(tube, imu)[cycle].tolist()
@@ -146,13 +127,8 @@ class Sensors:
         return sample + parts[cycle].tolist() if parts is not None and known else sample
 
     def _eighths(self, tube: int, imu: int) -> Array:
-        ends, random = self._ends(tube), self._random(Stream.GYRO, tube, imu)
-        errors = ImuErrors(self._file.gyroscope, self._file.accelerometer).times(self.noises[imu])
-        shown = float((errors.constants(random)[1] @ self.frame(tube, imu)[:, 2])[2])  # of a turn about the axis
-        borders = borders_of(ends)
-        turned = self._string.truth(tube).turned(borders.ravel())[0].reshape(borders.shape)
-        noise = self._random(Stream.INCREMENTS, tube, imu)
-        found = eighths(self.samples(tube, imu)[:, 2], shown * np.diff(turned, axis=1), errors.gyroscope, noise)
+        ends, mean, truth = self._ends(tube), self.samples(tube, imu)[:, 2], self._string.truth(tube)
+        found = read_eighths(mean, ends, self._imu(tube, imu), truth, self.frame(tube, imu))
         if self._string.rack is not None:
             found[ends <= self._string.rack.end] = np.nan
         return found
@@ -161,10 +137,7 @@ class Sensors:
         """Rig times (cycles,) at which the cycles of a tube end."""
         return np.asarray(self._string.ends + self._string.phase(tube))
 
-    def _bias_step(self, ends: Array) -> Array:
+    def _imu(self, tube: int, imu: int = 0, *, cold_at: float = 0.0) -> OneImu:
         turns_from = next(phase.start for phase in self._string.phases if phase.kind == "drill")
-        return np.asarray(math.radians(self._file.gyroscope.bias_step_dps) * (ends > turns_from))
-
-    def _random(self, purpose: Stream, tube: int, imu: int = 0) -> np.random.Generator:
-        further = [imu] if imu else []  # the first IMU of a tube draws what it draws alone
-        return stream(self._string.seed, purpose, tube, *further)
+        noise, seed = self.noises[imu], self._string.seed
+        return OneImu(self._file, seed, tube, imu, noise=noise, turns_from=turns_from, cold_at=cold_at)

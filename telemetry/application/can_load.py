@@ -8,10 +8,11 @@ Under keys every frame of the link has a seal, states and the measurement one of
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from telemetry.application.end_seal import OVERHEAD as END_SEAL
 from telemetry.application.measurement_seal import SEAL_SIZE
+from telemetry.frozen import replace
 from telemetry.media.can_exchange import PRESENCE_EVERY
 from telemetry.media.can_timing import CLASSIC_LARGEST, FD_LARGEST, BitRates
 from telemetry.media.isotp import frame_lengths

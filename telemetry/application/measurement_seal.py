@@ -10,8 +10,8 @@ from __future__ import annotations
 import struct
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
 
+from telemetry.frozen import replace
 from telemetry.messages import Aiding
 from telemetry.transport.key_ring import KeyRing
 from telemetry.transport.seal import TAG_SIZE

@@ -11,18 +11,17 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from telemetry.presentation.can_checks import Check, check_of
 from telemetry.presentation.can_signals import Scale, Signal
-from telemetry.presentation.fields import codec_of
 from telemetry.schema import Field
 
-Check = Callable[[Any], Any]
 Encoder = Callable[[Any], tuple[int, ...]]  # of a field's value; raises ValueError
 Decoder = Callable[[int], Any]  # of one signal's raw number; raises ValueError
 
 
 def encoder_of(field: Field, signals: list[Signal]) -> Encoder:
     """Function from a field's value to the raw numbers of its signals."""
-    check, first = codec_of(field).check, signals[0]
+    check, first = check_of(field), signals[0]
     if len(signals) == 3:
         return vector_encoder(check, [number_encoder(s, float, -field.high, field.high) for s in signals])
     if first.scale is Scale.BYTES:
@@ -96,7 +95,7 @@ def bytes_encoder(check: Check) -> Encoder:
 def decoder_of(field: Field, signal: Signal) -> Decoder:
     """Function from a raw number to the value it stands for, or to the component of the vector."""
     first = signal.first
-    check = codec_of(field).check if signal.name == field.name else component_check(codec_of(field).check)
+    check = check_of(field) if signal.name == field.name else component_check(check_of(field))
     match signal.scale:
         case Scale.DECIBEL:
             return levels_of(signal).__getitem__

@@ -11,17 +11,22 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+from telemetry.presentation.can_checks import check_of
 from telemetry.presentation.can_coders import levels_of, parts_of_one
 from telemetry.presentation.can_forms import Form
 from telemetry.presentation.can_signals import COUNT, ON_STEP, Scale, Signal
-from telemetry.presentation.compiled import RIGHT, compiled
-from telemetry.presentation.fields import codec_of
 from telemetry.quantities import ValueKind
 from telemetry.schema import Field
 
 Packer = Callable[[Sequence[Any], int], list[bytes] | None]  # data of each frame of the values of all fields, a count
 Unpacker = Callable[[Sequence[bytes]], list[Any] | None]  # values of all fields; raises ValueError
 OTHERWISE = "    return None"
+RIGHT = {
+    ValueKind.NUMBER: "type({v}) is float and {low!r} <= {v} <= {high!r}",
+    ValueKind.INTEGER: "type({v}) is int and {low!r} <= {v} <= {high!r}",
+    ValueKind.BOOLEAN: "{v} is True or {v} is False",
+    ValueKind.BINARY: "type({v}) is bytes and {low!r} <= len({v}) <= {high!r}",
+}  # what needs no check
 
 
 class Rounded(NamedTuple):
@@ -39,8 +44,8 @@ def packer_of(fields: Sequence[tuple[Field, Sequence[Signal]]], rounded: Sequenc
     """
     lines = [f"{' '.join(f'v{k},' for k in range(len(fields)))} = values"]
     for k, (field, signals) in enumerate(fields):
-        lines += guard(f"v{k}", field, signals)
-    lines += [line for one in rounded for line in rounding(one, fields[one.value][1][0])]
+        lines += guard_lines(f"v{k}", field, signals)
+    lines += [line for one in rounded for line in rounding_lines(one, fields[one.value][1][0])]
     bits = [[f"count & {COUNT.largest}"] for _ in form.layouts]
     places = iter(form.places)
     for k, (_, signals) in enumerate(fields):
@@ -55,7 +60,7 @@ def packer_of(fields: Sequence[tuple[Field, Sequence[Signal]]], rounded: Sequenc
         f"({' | '.join(of)}).to_bytes({layout.length}, 'little')" for of, layout in zip(bits, form.layouts, strict=True)
     ]
     space = {f"kind_of_v{k}": field.enumeration for k, (field, _) in enumerate(fields)} | {"log10": math.log10}
-    packer: Packer = compiled([*lines, f"return [{', '.join(data)}]"], space, [], "values, count")
+    packer: Packer = compile_function([*lines, f"return [{', '.join(data)}]"], space, "values, count")
     return packer
 
 
@@ -80,12 +85,12 @@ def unpacker_of(fields: Sequence[tuple[Field, Sequence[Signal]]], form: Form) ->
             found.append(f"({', '.join(names)})")
         else:
             found.append(" + ".join(names))
-    codecs = [codec_of(field) for field, _ in fields]
-    unpacker: Unpacker = compiled([*lines, f"return [{', '.join(found)}]"], space, codecs, "frames")
+    space |= {f"check{k}": check_of(field) for k, (field, _) in enumerate(fields) if field.enumeration is not None}
+    unpacker: Unpacker = compile_function([*lines, f"return [{', '.join(found)}]"], space, "frames")
     return unpacker
 
 
-def guard(v: str, field: Field, signals: Sequence[Signal]) -> list[str]:
+def guard_lines(v: str, field: Field, signals: Sequence[Signal]) -> list[str]:
     """Lines that give up where a value needs a check, or is beyond its signal."""
     if not signals:
         return [f"if {v} != {field.before!r}:", OTHERWISE]
@@ -113,7 +118,7 @@ def guard(v: str, field: Field, signals: Sequence[Signal]) -> list[str]:
     return [f"if not ({right}):", OTHERWISE, *halves]
 
 
-def rounding(one: Rounded, signal: Signal) -> list[str]:
+def rounding_lines(one: Rounded, signal: Signal) -> list[str]:
     """Lines for what a rounding adds to a variance, see ``can_messages.Rounding.added``."""
     step = f"{signal.step!r}" if one.rate is None else f"(v{one.rate} * {signal.step!r})"
     return [
@@ -162,14 +167,26 @@ def value_lines(name: str, place: int, field: Field, signal: Signal, space: dict
         case Scale.INTEGER if field.enumeration is not None:
             return [f"{name} = check{place}(raw + {signal.first})"]
         case Scale.INTEGER:
-            return [f"{name} = raw + {signal.first}", *within(name, field)]
+            return [f"{name} = raw + {signal.first}", *within_lines(name, field)]
     parts = parts_of_one(signal)
     scaled = f"(raw + {signal.first}) {f'/ {parts}' if parts else f'* {signal.step!r}'}"
     unless = f"inf if raw == {signal.largest} else " if signal.scale is Scale.AGE else ""
-    return [f"{name} = {unless}{scaled}", *within(name, field)]
+    return [f"{name} = {unless}{scaled}", *within_lines(name, field)]
 
 
-def within(name: str, field: Field) -> list[str]:
+def within_lines(name: str, field: Field) -> list[str]:
     """Lines that give up where a value is outside the range of the schema."""
     low = -field.high if field.kind is ValueKind.VECTOR else field.low
     return [f"if not {low!r} <= {name} <= {field.high!r}:", OTHERWISE]
+
+
+def compile_function(lines: list[str], space: dict[str, Any], arguments: str) -> Callable[..., Any]:
+    """Function of its lines, which may name ``arguments``, what is in ``space`` and infinity.
+
+    Read signal by signal a message takes three times as long and more, which ``benchmarks/codec.py`` holds.
+    """
+    space["inf"] = math.inf
+    source = f"def function({arguments}):\n" + "\n".join(f"    {line}" for line in lines)
+    exec(compile(source, "<compiled from the schema>", "exec"), space)
+    function: Callable[..., Any] = space["function"]
+    return function

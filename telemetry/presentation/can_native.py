@@ -17,13 +17,13 @@ from telemetry.messages import Message
 from telemetry.presentation.can_forms import FD_PART
 from telemetry.presentation.can_messages import NATIVE
 from telemetry.presentation.can_signals import COUNT
+from telemetry.presentation.message_codec import CODEC_OF
 from telemetry.presentation.msgpack_codec import (
-    CODEC_OF,
     HIGHEST_ADDRESS,
-    Opened,
     UnwrittenMessage,
     open_payload,
     values_of_opened,
+    write_payload,
 )
 from telemetry.schema import SPEC_OF, Kind
 from telemetry.transport.hop import Header, LinkFrame, pack_frame, parse_frame
@@ -145,7 +145,7 @@ def native_parts(payload: Content, count: int, *, fd: bool) -> list[NativePart] 
         native = NATIVE.get(said.kind)
         if native is None:
             return None
-        values = values_of_opened(said) if isinstance(said, Opened) else said.values
+        values = said.values if isinstance(said, UnwrittenMessage) else values_of_opened(said)
         frames = native.pack(values, count, fd=fd)
     except (DecodeError, EncodeError):
         return None
@@ -175,7 +175,8 @@ def _rounded_payload(payload: bytes) -> bytes:
         native = NATIVE.get(opened.kind)
         if native is None:
             return payload
-        return CODEC_OF[native.kind].pack(native.values_of(native.raws_of_values(values_of_opened(opened))))
+        values = native.values_of(native.raws_of_values(values_of_opened(opened)))
+        return write_payload(CODEC_OF[native.kind], values)
     except (DecodeError, EncodeError):
         return payload
 

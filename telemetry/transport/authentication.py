@@ -12,10 +12,10 @@ import os
 import secrets
 import stat
 import struct
-from dataclasses import replace
 from pathlib import Path
 
 from telemetry.errors import KeyFileError
+from telemetry.frozen import replace
 from telemetry.messages import BlockSegment
 
 DOMAIN = b"borechain block segment 1"

@@ -5,9 +5,10 @@ from typing import Any
 
 import jsonschema
 
-from groundstation.service.answers.answer_fields import Fields, object_schema
+from groundstation.service.answers.answer_texts import plain_answer
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.paths import paths
+from groundstation.service.answers.paths import answered_paths, find_path
+from groundstation.service.answers.shapes.answer_fields import Fields, object_schema
 
 
 @functools.cache
@@ -23,9 +24,14 @@ def check_answer(view: dict[str, Any], fields: Fields) -> None:
     validator(fields).validate(view)
 
 
+def shown_on(model: RigModel, path: str, **parameters: str) -> dict[str, Any]:
+    """What a model shows on a path, behind the header."""
+    return plain_answer(find_path(model, path).view(model, parameters))
+
+
 def check_answers(model: RigModel) -> set[str]:
     """Every answer that a model has; returns their paths."""
-    found = paths(model)
+    found = answered_paths(model)
     for path in found.values():
         check_answer(path.show(model, {}), path.fields)
     return set(found)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from hand_fed import Rig
 
 from groundstation.gateway.lease import take_lease
-from groundstation.gateway.page.settings import PageSettings
+from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.host import answering, page_of
 from telemetry.media.zenoh_bus import open_router
 from telemetry.messages import Event, Severity

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from groundstation.recording.recording_file import RecordedSample, RecordingWriter
-from groundstation.service.answers.paths import schemas
+from groundstation.service.answers.answer_table import schemas_by_path
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import BEGIN, Intake, pack_intake
 
@@ -15,7 +15,7 @@ INTAKE = "borechain/rig-1/intake"
 
 
 def shown() -> dict[str, bytes]:
-    return {pattern: json.dumps(schema).encode() for pattern, schema in schemas().items()}
+    return {pattern: json.dumps(schema).encode() for pattern, schema in schemas_by_path().items()}
 
 
 def begin_of(ground: GroundProcess) -> Intake:

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from memory_rig import NOISELESS, Rig
+from schemas import shown_on
 
 from groundstation.config import GroundConfig
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.views import node, stations
 from groundstation.service.hole.resolved_stops import force_var
 from groundstation.service.orders.order_book import Order
 from groundstation.survey.fusion.resolve import combine_imus
@@ -52,7 +52,7 @@ def test_an_alignment_is_ordered_followed_and_shown_at_the_surface(tmp_path: Pat
     rig.run(12.0)
     assert rig.ordered().detail == "the static bias is not known yet"
     rig.run(50.0)
-    assert node(rig.ground.model, 1)["alignment"] is None
+    assert shown_on(rig.ground.model, "nodes/1")["alignment"] is None
     reply = rig.ordered(method="circle", turns=1.0)
     assert (reply.done, reply.values) == (True, {"method": "circle", "turns": 1.0})
     rig.spin = 10.0 * DEG
@@ -105,7 +105,7 @@ def test_the_ground_station_weighs_all_imus_of_a_survey() -> None:
     )
     survey = SurveyMeasurement(1, 1, 1000.0, 1, imus, 0.0, 1e-9, 1e-9, 32, 20.0, NodeFlag.NONE)
     assert model.on_survey(survey, 2.0) == ""
-    row = stations(model, {})["stations"][0]
+    row = shown_on(model, "stations")["stations"][0]
     assert row["inclination_deg"] * DEG == pytest.approx(lean + 1e-4 / G, abs=1e-9)
     assert row["sigma_force_mps2"] ** 2 == pytest.approx(0.75e-8)
     covs = np.array([imu.force_cov for imu in imus])

@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from schemas import check_answers
+from schemas import check_answers, shown_on
 from test_model import survey
 
 from borechain.drilling.inline import InlineRig
 from groundstation.config import GroundConfig
-from groundstation.service.answers import measurement_views, views
 from groundstation.service.answers.model import RigModel
 from sim.rig.ground_settings import ground_settings
 from sim.world.scenario import scenario_of
@@ -48,7 +47,7 @@ def model_of(folder: Path, placed: list[Placed], **settings: Any) -> RigModel:
 
 def rows(model: RigModel) -> list[dict[str, Any]]:
     check_answers(model)
-    found: list[dict[str, Any]] = views.stations(model, {})["stations"]
+    found: list[dict[str, Any]] = shown_on(model, "stations")["stations"]
     return found
 
 
@@ -59,7 +58,7 @@ def test_stations_have_the_transport_and_measurements_have_not(tmp_path: Path) -
         assert row["azimuth_deg"] == pytest.approx(n * STEP_DEG, abs=3e-3)
         assert row["transport_deg"] == pytest.approx(n * LACKED_DEG, abs=3e-3)
         assert 0.0 < row["sigma_transport_deg"] < 0.05
-        for measured in measurement_views.station_measurements(model, n)["measurements"]:
+        for measured in shown_on(model, f"stations/{n}/measurements")["measurements"]:
             assert measured["azimuth_deg"] == pytest.approx(row["azimuth_deg"] - row["transport_deg"], abs=1e-6)
 
 

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.config import GroundConfig
+from groundstation.service.answers.answer_texts import plain_answer
 from groundstation.service.answers.measurement_views import measurement_rows
 from groundstation.service.answers.model import RigModel
 from groundstation.service.hole.resolved_stops import Cluster, Clusters, Table, cluster_of
@@ -104,7 +105,7 @@ def test_what_is_shown_of_many_surveys_is_what_each_of_them_says() -> None:
         cluster(tube, number, 10.0 * number, imus=1 + number % 3) for number, tube in enumerate((1, 4, 2, 4, 1), 1)
     ]
     rows = [table.append_cluster(one) for one in known]
-    shown = measurement_rows(table, rows[::-1], [3, 1, 1, 2, 9])
+    shown = plain_answer(measurement_rows(table, rows[::-1], [3, 1, 1, 2, 9]))
     for view, one, station in zip(shown, known[::-1], (3, 1, 1, 2, 9), strict=True):
         inclination, azimuth = direction_angles(one.direction.lean, one.direction.down)
         stds = angle_stds(one.direction.lean, one.direction.down, one.direction.total_cov)

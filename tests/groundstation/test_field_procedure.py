@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from memory_rig import Rig
-from schemas import check_answer
+from schemas import check_answer, shown_on
 
 from groundstation.calibration.attitudes import true_vectors
 from groundstation.calibration.block import read_calibration
 from groundstation.errors import SelectorError
-from groundstation.service.answers import key_fields
+from groundstation.service.answers.answer_table import ANSWERS
 from groundstation.service.orders.recalibration.procedure import FieldProcedure, Request
 from groundstation.service.orders.recalibration.recalibration_progress import Phase, Progress, Stage
 from node.kernels.arithmetic.formats import DEG
@@ -38,12 +38,12 @@ class Field(Rig):
 
     def command(self, action: str, **parameters: str) -> dict[str, Any]:
         self.ground.operator.order("recalibrate", {"action": action} | parameters)
-        check_answer(self.ground.operator.ask("recalibration"), (*key_fields.HEADER, *key_fields.RECALIBRATION))
+        check_answer(self.ground.operator.ask("recalibration"), ANSWERS["recalibration"].fields)
         return self.view()
 
     def view(self) -> dict[str, Any]:
         """What the key shows, as it stands on the wire."""
-        view: dict[str, Any] = json.loads(json.dumps(self.ground.model.recalibration.view()))
+        view: dict[str, Any] = json.loads(json.dumps(shown_on(self.ground.model, "recalibration")))
         return view
 
     def lay(self, pitch_deg: float, roll_deg: float) -> None:
@@ -83,7 +83,7 @@ def rig(tmp_path: Path) -> Field:
 
 def check(rig: Field) -> None:
     """Every tube uses its new block, says so, and reads gravity where it lies."""
-    check_answer(rig.ground.operator.ask("recalibration"), (*key_fields.HEADER, *key_fields.RECALIBRATION))
+    check_answer(rig.ground.operator.ask("recalibration"), ANSWERS["recalibration"].fields)
     for row in rig.view()["tubes"]:
         process = rig.tube(row["tube"])
         assert row["phase"] == "done", row
@@ -405,10 +405,10 @@ def test_records_are_matched_by_the_command_that_asked_for_them() -> None:
     procedure.on_sent(ask, 42)
     assert procedure.due_requests(10.0) == []
     procedure.on_static_record(record(7, 110.0))  # an operator's own
-    assert procedure.view()["tubes"][0]["records"] == 0
+    assert procedure.count_records(procedure.progress.tubes[1]) == 0
     assert [a.name for a in procedure.due_requests(1.0 + 8.0 + 15.0)] == ["static_record"]  # nothing came: once more
     procedure.on_static_record(record(42, 90.0))  # of a tube that does not know rig time yet
-    assert procedure.view()["tubes"][0]["records"] == 0
+    assert procedure.count_records(procedure.progress.tubes[1]) == 0
     procedure.on_static_record(record(42, 110.0))
-    assert procedure.view()["tubes"][0]["records"] == 1
+    assert procedure.count_records(procedure.progress.tubes[1]) == 1
     assert procedure.due_requests(math.inf) == []

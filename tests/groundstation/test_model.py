@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from schemas import check_answers
+from schemas import check_answers, shown_on
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
-from groundstation.service.answers import alarm_views, column_views
 from groundstation.service.answers.model import RigModel
 from groundstation.survey.fusion.resolve import direction_angles
 from groundstation.survey.well.ellipsoid import plan_ellipse
@@ -246,7 +245,7 @@ def test_a_measurement_that_is_none_is_counted_and_changes_nothing(tmp_path: Pat
 def test_the_random_part_of_a_station_shrinks_and_its_joints_stay(tmp_path: Path) -> None:
     def stds(count: int) -> dict[str, Any]:
         measurements = [(survey(1, stop, 1, 5.0), 2.0) for stop in range(1, count + 1)]
-        view = column_views.uncertainty(knowing(tmp_path, measurements, 1), {})
+        view = shown_on(knowing(tmp_path, measurements, 1), "uncertainty")
         return view["stations"][-1]["sources"]
 
     one, nine = stds(1), stds(9)
@@ -257,7 +256,7 @@ def test_the_random_part_of_a_station_shrinks_and_its_joints_stay(tmp_path: Path
 
 def test_uncertainty_is_told_at_a_confidence_with_its_sources(tmp_path: Path) -> None:
     model = knowing(tmp_path, passes(4, lambda _stop, station: 1.0 + station), 4)
-    view = column_views.uncertainty(model, {})
+    view = shown_on(model, "uncertainty")
     assert view["confidence"] == 0.95
     assert view["sigma_plane"] == pytest.approx(2.4477, abs=1e-4)
     assert view["sigma_space"] == pytest.approx(2.7955, abs=1e-4)
@@ -278,7 +277,7 @@ def test_uncertainty_is_told_at_a_confidence_with_its_sources(tmp_path: Path) ->
 
 def test_another_confidence_scales_the_regions(tmp_path: Path) -> None:
     model = knowing(tmp_path, passes(2, lambda _stop, _station: 1.0), 2)
-    half = column_views.uncertainty(model, {"confidence": "0.5"})
+    half = shown_on(model, "uncertainty", confidence="0.5")
     assert half["confidence"] == 0.5
     assert half["sigma_plane"] == pytest.approx(math.sqrt(2.0 * math.log(2.0)))
     major, wanted = half["stations"][-1]["plan_ellipse"]["major_m"], model.hole.trajectory[-1].cov
@@ -288,17 +287,17 @@ def test_another_confidence_scales_the_regions(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["", "abc", "0", "1", "-0.5", "95", "nan", "inf", "1e-999"])
 def test_a_confidence_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
     with pytest.raises(SelectorError, match="confidence"):
-        column_views.uncertainty(RigModel(GroundConfig(folder=tmp_path)), {"confidence": text})
+        shown_on(RigModel(GroundConfig(folder=tmp_path)), "uncertainty", confidence=text)
 
 
 def test_views_of_nothing_have_the_collar_alone(tmp_path: Path) -> None:
     model = RigModel(GroundConfig(folder=tmp_path))
-    assert [row["md_m"] for row in column_views.uncertainty(model, {})["stations"]] == [0.0]
-    column = column_views.column(model, {})
+    assert [row["md_m"] for row in shown_on(model, "uncertainty")["stations"]] == [0.0]
+    column = shown_on(model, "column")
     assert [row["deviation_cm"] for row in column["stations"]] == [0.0]
     assert column["projection"] is None
     assert column["dominant"] is None
-    alarms = alarm_views.alarms(model, {})
+    alarms = shown_on(model, "alarms")
     assert (alarms["active"], alarms["cleared"], alarms["moved"]) == ([], [], [])
 
 
@@ -306,7 +305,7 @@ def column_of(tmp_path: Path, inclination: float, azimuth: float, **settings: An
     """Five stations of a hole that leans alike all along, each read by the tube at the bit."""
     measurements = [(survey(1, stop, 1, inclination, azimuth), 2.0 * stop) for stop in range(1, 6)]
     model = knowing(tmp_path, measurements, 1, **settings)
-    return model, column_views.column(model, {})
+    return model, shown_on(model, "column")
 
 
 def test_a_column_is_told_in_centimetres_percent_and_degrees(tmp_path: Path) -> None:
@@ -358,7 +357,7 @@ def test_a_column_along_its_inclined_design_deviates_by_its_vertical_start_alone
 
 def test_a_column_that_leaves_its_tolerance_raises_alarms_with_their_threshold(tmp_path: Path) -> None:
     model, _ = column_of(tmp_path, 1.0, 120.0, tolerance="5-cm")
-    view = alarm_views.alarms(model, {})
+    view = shown_on(model, "alarms")
     assert view["levels_percent"] == [50, 80, 100]
     deviations = {row["level_percent"]: row for row in view["active"] if row["kind"] == "deviation"}
     assert set(deviations) == {50, 80, 100}
@@ -377,7 +376,7 @@ def test_a_column_that_leaves_its_tolerance_raises_alarms_with_their_threshold(t
 def test_an_alarm_of_a_projection_is_cleared_when_the_hole_is_steered_back(tmp_path: Path) -> None:
     measurements = [(survey(1, stop, 1, 2.0), 2.0 * stop) for stop in range(1, 3)]
     measurements += [(survey(1, stop, 1, 0.0), 2.0 * stop) for stop in range(3, 6)]
-    view = alarm_views.alarms(knowing(tmp_path, measurements, 1), {})
+    view = shown_on(knowing(tmp_path, measurements, 1), "alarms")
     cleared = {row["level_percent"]: row for row in view["cleared"] if row["kind"] == "projection"}
     assert set(cleared) == {50, 80, 100}
     assert cleared[100]["cleared_at_s"] == pytest.approx(3 * BETWEEN_STOPS + 0.5)
@@ -387,7 +386,7 @@ def test_an_alarm_of_a_projection_is_cleared_when_the_hole_is_steered_back(tmp_p
 def test_the_alarms_tell_of_stations_that_moved(tmp_path: Path) -> None:
     model = knowing(tmp_path, moving(4, 4), 4)
     check_answers(model)
-    view = alarm_views.alarms(model, {})["moved"]
+    view = shown_on(model, "alarms")["moved"]
     assert len(view) == len(model.hole.moved) > 0
     for row, moved in zip(view, model.hole.moved, strict=True):
         assert row == {

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from sim.rig.report import missing_surveys
 from sim.rig.scheduler import Scheduler
 from sim.world.scenario import load_scenario, scenario_of
 from sim.world.world import World
+from telemetry.frozen import replace
 from telemetry.messages import BASE, ENCODER, DepthReading
 from telemetry.presentation.msgpack_codec import encode
 

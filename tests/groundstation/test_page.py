@@ -24,12 +24,12 @@ from served import Served, serving
 
 from groundstation.errors import ConfigurationError, PageError
 from groundstation.gateway.page.application import FILES
-from groundstation.gateway.page.openapi import document
+from groundstation.gateway.page.openapi import openapi_document
+from groundstation.gateway.page.page_settings import PageSettings, check_certificate, open_page_socket, parse_address
 from groundstation.gateway.page.passwords import drawn_password, hash_of, is_right, read_passwords, text_of
 from groundstation.gateway.page.server import CONNECTIONS, SERVER_TASK
 from groundstation.gateway.page.sessions import LONGEST_HOLD_S, SESSIONS, VALID_S, Sessions, WrongPasswords, is_from
-from groundstation.gateway.page.settings import PageSettings, check_certificate, listen, parse_address
-from groundstation.service.answers.paths import PATTERNS
+from groundstation.service.answers.answer_table import PATTERNS
 from telemetry.application.commands import COMMANDS
 from telemetry.errors import KeyFileError
 
@@ -114,7 +114,7 @@ def test_a_page_that_was_open_for_a_day_is_asked_for_its_role_again() -> None:
 
 
 def test_the_document_describes_every_command_with_its_ranges() -> None:
-    paths = document("1")["paths"]
+    paths = openapi_document("1")["paths"]
     for spec in COMMANDS:
         schema = paths[f"/api/cmd/{spec.name}"]["post"]["requestBody"]["content"]["application/json"]["schema"]
         schemas = schema.get("oneOf", [schema])
@@ -362,7 +362,7 @@ def test_a_port_that_is_taken_is_told_with_the_remedy() -> None:
         other.listen()
         taken = PageSettings("127.0.0.1", other.getsockname()[1])
         with pytest.raises(PageError, match=r"Address already in use; choose another with --page 127\.0\.0\.1:PORT"):
-            listen(taken)
+            open_page_socket(taken)
 
 
 @pytest.mark.parametrize("wrong", ["", "8080", "127.0.0.1:", "127.0.0.1:0", "127.0.0.1:99999", "127.0.0.1:http"])

@@ -8,9 +8,9 @@ from hand_fed import Rig
 from page_client import PageClient, free_port
 from served import serving
 
-from groundstation.gateway.page.guard import RequestError
-from groundstation.gateway.page.reports import Reporter
-from groundstation.gateway.page.settings import PageSettings
+from groundstation.gateway.page.page_settings import PageSettings
+from groundstation.gateway.page.reports import ReportTypesetter
+from groundstation.gateway.page.request_guard import RequestError
 
 pytestmark = pytest.mark.slow
 WALL = """
@@ -53,7 +53,7 @@ def test_wall_and_hole_come_as_pdf_and_another_is_refused_meanwhile(rig: Rig) ->
 
 def test_a_second_report_waits_for_the_first(rig: Rig) -> None:
     rig.drill(1, 0.3)
-    reporter = Reporter(rig.ground.model, "0")
+    reporter = ReportTypesetter(rig.ground.model, "0")
 
     async def both() -> list[object]:
         return await asyncio.gather(reporter.pdf("hole"), reporter.pdf("wall"), return_exceptions=True)
@@ -68,5 +68,5 @@ def test_a_second_report_waits_for_the_first(rig: Rig) -> None:
 def test_a_rig_without_a_wall_says_how_it_gets_one(tmp_path: Path) -> None:
     rig = Rig(tmp_path, target=8.0)
     with pytest.raises(RequestError, match="no wall; see --wall and --hole"):
-        asyncio.run(Reporter(rig.ground.model, "0").pdf("wall"))
+        asyncio.run(ReportTypesetter(rig.ground.model, "0").pdf("wall"))
     rig.ground.close()

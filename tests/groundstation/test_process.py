@@ -7,7 +7,6 @@ import json
 import socket
 from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from hand_fed import COV, VAR, Rig
 from schemas import check_answers
 
 from groundstation.host import answering
+from telemetry.frozen import replace
 from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
 from telemetry.messages import (
     Event,

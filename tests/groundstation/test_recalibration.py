@@ -20,6 +20,7 @@ from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import DEG
 from node.process.block_store import BlockStore
 from node.process.tube_process import TubeProcess
+from telemetry import frozen
 from telemetry.messages import BASE, ENCODER, BlockSegment, StaticRecord, UploadPhase
 from telemetry.parameters import ParameterBlock, SensorParameters
 from telemetry.runtime import disk as disk_room
@@ -121,7 +122,7 @@ def test_a_segment_changed_on_its_way_is_refused_told_and_repeated(rig: Rig) -> 
     def tamper(segment: BlockSegment) -> None:
         if segment.index == 1 and not changed:
             changed.append(segment)
-            segment = replace(segment, data=bytes(len(segment.data)))
+            segment = frozen.replace(segment, data=bytes(len(segment.data)))
         send(segment)
 
     rig.ground.endpoint.mail.send_segment = tamper  # type: ignore[method-assign]

@@ -1,7 +1,6 @@
 """A survey that is said again takes the place of the one before: it is as if the last word were the only one."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +8,13 @@ import orjson
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from schemas import shown_on
 from test_model import Placed, passes
 
 from groundstation.config import GroundConfig
-from groundstation.service.answers import measurement_views, views
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.paths import FIXED, header
+from groundstation.service.answers.paths import answer_header, find_path
+from telemetry.frozen import replace
 from telemetry.messages import NodeFlag
 
 STOPS = 5
@@ -35,13 +35,13 @@ def heard(tmp_path: Path, measurements: list[Placed]) -> RigModel:
 
 def shown(model: RigModel) -> dict[str, Any]:
     """What operators see, but for the numbers that say in which order it came."""
-    rows = measurement_views.measurements(model, {})["measurements"]
+    rows = shown_on(model, "measurements")["measurements"]
     for row in rows:
         del row["seq"], row["replaces"]
     return {
         "measurements": rows,
-        "stations": views.stations(model, {})["stations"],
-        "trajectory": views.trajectory(model, {})["points"],
+        "stations": shown_on(model, "stations")["stations"],
+        "trajectory": shown_on(model, "trajectory")["points"],
         "moved": [(one.md, one.at, one.dropped) for one in model.hole.moved],
     }
 
@@ -78,12 +78,12 @@ def test_the_last_word_of_every_survey_counts_in_whatever_order_they_come(tmp_pa
 def test_a_revision_says_what_it_replaces_and_is_new_in_the_stream(tmp_path: Path) -> None:
     first = passes(2, lambda _stop, _station: 1.0)
     model = heard(tmp_path, first)
-    newest = measurement_views.measurements(model, {})["newest"]
+    newest = shown_on(model, "measurements")["newest"]
     model.on_survey(*revised(first[0], 7, 1e-3))
     model.on_survey(*revised(first[0], 9, 2e-3))
-    answer = measurement_views.measurements(model, {"since": str(newest), "limit": "10"})
+    answer = shown_on(model, "measurements", since=str(newest), limit="10")
     assert [(row["sequence"], row["replaces"], row["seq"]) for row in answer["measurements"]] == [(9, 7, newest + 2)]
-    assert len(measurement_views.measurements(model, {})["measurements"]) == len(first)
+    assert len(shown_on(model, "measurements")["measurements"]) == len(first)
 
 
 def test_an_older_word_that_comes_late_changes_nothing(tmp_path: Path) -> None:
@@ -110,9 +110,9 @@ def test_a_survey_whose_yaw_becomes_known_is_trusted_from_then_on(tmp_path: Path
 def test_a_better_yaw_shows_in_the_station(tmp_path: Path) -> None:
     first = passes(1, lambda _stop, _station: 30.0)
     model = heard(tmp_path, first)
-    (before,) = views.stations(model, {})["stations"]
+    (before,) = shown_on(model, "stations")["stations"]
     model.on_survey(*revised(first[0], 5, math.radians(1.0)))
-    (after,) = views.stations(model, {})["stations"]
+    (after,) = shown_on(model, "stations")["stations"]
     assert after["azimuth_deg"] - before["azimuth_deg"] == pytest.approx(1.0)
     assert after["sigma_yaw_deg"] == pytest.approx(0.5 * before["sigma_yaw_deg"])
 
@@ -124,11 +124,12 @@ def test_the_text_of_all_measurements_is_that_of_now_however_often_it_was_asked_
 ) -> None:
     first = data.draw(st.permutations(passes(3, lambda _stop, _station: 1.0)))  # a station may come above others
     course = first + [revised(one, LATER + n, 1e-3) for n, one in enumerate(data.draw(st.permutations(first))[:3])]
-    model, path = heard(tmp_path, []), FIXED["measurements"]
+    model = heard(tmp_path, [])
+    path = find_path(model, "measurements")
     for placed in course:
         model.on_survey(*placed)
         for parameters in data.draw(st.lists(st.sampled_from(SELECTIONS), max_size=3)):
-            shown_now = measurement_views.measurements(model, parameters)
+            shown_now = shown_on(model, "measurements", **parameters)
             answer = orjson.loads(path.json(model, parameters))
             assert {name: answer[name] for name in shown_now} == orjson.loads(orjson.dumps(shown_now))
-            assert list(answer) == [*header(model), *shown_now]
+            assert list(answer) == [*vars(answer_header(model)), *shown_now]

@@ -1,6 +1,5 @@
 """Which states show that a tube lives, and how old they are."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from hypothesis import strategies as st
 from groundstation.config import GroundConfig
 from groundstation.service.answers.model import RigModel
 from groundstation.service.process.ground_process import GroundProcess
+from telemetry.frozen import replace
 from telemetry.messages import EPOCH_UNKNOWN, Mode, NodeFlag, NodeState, Side
 
 VAR = 1e-7

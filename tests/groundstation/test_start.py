@@ -11,7 +11,7 @@ from borechain.load.day import ADVANCES, BEGUN_AT, depth_of, write_day
 from borechain.load.learning import ASKED, LearningLoad, measure_learning
 from groundstation.config import GroundConfig
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.paths import find
+from groundstation.service.answers.paths import find_path
 from groundstation.service.process.ground_process import GroundProcess
 
 TUBES, STOPS = 8, 12
@@ -20,9 +20,9 @@ OF_THE_HOLE = ("stations", "stations/1", "trajectory", "uncertainty", "column", 
 
 def answers(model: RigModel) -> dict[str, bytes]:
     """What is told of the hole now and at the end of every stop, without the header of the moment."""
-    told = {path: orjson.dumps(find(model, path).view(model, {})) for path in OF_THE_HOLE}
+    told = {path: orjson.dumps(find_path(model, path).view(model, {})) for path in OF_THE_HOLE}
     moments = [str(moment.number) for moment in model.hole.history.moments]
-    return told | {n: orjson.dumps(find(model, "column").view(model, {"moment": n})) for n in moments}
+    return told | {n: orjson.dumps(find_path(model, "column").view(model, {"moment": n})) for n in moments}
 
 
 @pytest.mark.slow

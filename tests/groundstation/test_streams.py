@@ -15,7 +15,7 @@ from schemas import check_answers
 
 from groundstation.errors import SelectorError
 from groundstation.host import answering
-from groundstation.service.answers.paths import paths
+from groundstation.service.answers.paths import answered_paths
 from telemetry.media.zenoh_bus import open_client, open_router
 from telemetry.messages import Event, Severity
 
@@ -48,7 +48,7 @@ def test_what_is_sent_is_what_there_is_also_of_a_hole_that_has_grown(tmp_path: P
     for stop in range(3):
         if stop:
             rig.drill(stop, 0.3)
-        for path in paths(rig.ground.model):
+        for path in answered_paths(rig.ground.model):
             shown, sent = rig.ask(path), json.loads(rig.ground.operator.ask_json(path))
             assert list(sent) == list(shown)
             assert sent.pop("utc") >= shown.pop("utc")

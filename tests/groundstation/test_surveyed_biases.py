@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +11,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from memory_rig import Rig
-from schemas import check_answer
+from schemas import check_answer, shown_on
 
 from groundstation.config import SENSOR_BIAS_DEG, GroundConfig
 from groundstation.errors import SelectorError
-from groundstation.service.answers import key_fields
+from groundstation.service.answers.answer_table import ANSWERS
 from groundstation.service.answers.model import RigModel
 from groundstation.service.orders.surveyed_biases import GRAVITY_STD, surveyed_biases
 from groundstation.survey.fusion.force_biases import ForceBias
+from telemetry.frozen import replace
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, SensorParameters
 
@@ -123,12 +123,12 @@ class Surveyed(Rig):
 
     def command(self, action: str, **parameters: str) -> dict[str, Any]:
         self.ground.operator.order("recalibrate", {"action": action} | parameters)
-        check_answer(self.ground.operator.ask("recalibration"), (*key_fields.HEADER, *key_fields.RECALIBRATION))
-        view: dict[str, Any] = json.loads(json.dumps(self.ground.model.recalibration.view()))
+        check_answer(self.ground.operator.ask("recalibration"), ANSWERS["recalibration"].fields)
+        view: dict[str, Any] = json.loads(json.dumps(shown_on(self.ground.model, "recalibration")))
         return view
 
     def is_done(self) -> bool:
-        return self.ground.model.recalibration.view()["state"] == "done"
+        return shown_on(self.ground.model, "recalibration")["state"] == "done"
 
 
 @pytest.mark.slow

@@ -1,7 +1,6 @@
 """Every flag of a survey has its stated effect on the fusion, whatever the rest of the survey is."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from schemas import shown_on
 
 from groundstation.config import GroundConfig
-from groundstation.service.answers import views
 from groundstation.service.answers.model import RigModel
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import direction_angles, resolve_direction
@@ -23,6 +22,7 @@ from groundstation.survey.fusion.survey_trust import (
     with_uncertain_yaw,
     with_unknown_yaw,
 )
+from telemetry.frozen import replace
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 
 G, DEG, VAR = 9.81, math.pi / 180.0, (0.0034**2) / 32
@@ -50,7 +50,7 @@ def station_of(folder: Path, *surveys: SurveyMeasurement, **config: Any) -> dict
     model = RigModel(GroundConfig(folder=folder, **config))
     for measurement in surveys:
         model.on_survey(measurement, MD)
-    return views.stations(model, {})["stations"][0] if model.stations else None
+    return shown_on(model, "stations")["stations"][0] if model.stations else None
 
 
 def test_every_flag_has_its_effect() -> None:
@@ -90,13 +90,13 @@ def test_a_survey_of_a_faulty_sensor_is_set_aside(tmp_path: Path) -> None:
     model = RigModel(GroundConfig(folder=tmp_path))
     assert model.on_survey(survey(1, flags=NodeFlag.SENSOR_FAULT), MD) == "survey_set_aside"
     assert model.stations == []
-    assert views.status(model, {})["set_aside_measurements"] == 1
+    assert shown_on(model, "status")["set_aside_measurements"] == 1
 
 
 def test_a_survey_without_rig_time_has_no_depth(tmp_path: Path) -> None:
     model = RigModel(GroundConfig(folder=tmp_path))
     assert model.on_survey(survey(1, flags=NodeFlag.CLOCK_UNSYNCHRONISED), MD) == "survey_unplaced"
-    assert views.status(model, {})["unplaced_measurements"] == 1
+    assert shown_on(model, "status")["unplaced_measurements"] == 1
 
 
 @pytest.mark.parametrize("flag", [flag for flag, effect in EFFECTS.items() if effect is Trust.FULL])

@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from schemas import check_answer
+from schemas import check_answer, shown_on
 
 from groundstation.config import GroundConfig
 from groundstation.service.alarms.verdict import WINDS, Doubt, Known, Verdict, Word, direction, judge, wind
-from groundstation.service.answers.key_fields import VERDICT
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.rounding import rounded, rounded_std
-from groundstation.service.answers.verdict_views import line, verdict
+from groundstation.service.answers.rounding import round_to_std, rounded_std
+from groundstation.service.answers.shapes.answer_fields import fields_of_answer
+from groundstation.service.answers.shapes.column_shapes import Verdict as VerdictAnswer
+from groundstation.service.answers.verdict_views import verdict_line
 from groundstation.survey.wall.column_deviation import Deviation
 
 LENGTH, LIMIT = 20.0, 0.45
@@ -51,7 +52,7 @@ def test_each_level_of_the_tolerance_has_its_word(worst: float, end: float, word
 
 def test_the_line_of_a_hole_that_is_to_be_steered() -> None:
     facts = known(0.9733)
-    assert line(judge(facts)) == "STEER: ends 43.8 ± 0.2 cm at 253 deg WSW; limit 45 (97 %); act before 13.0 m"
+    assert verdict_line(judge(facts)) == "STEER: ends 43.8 ± 0.2 cm at 253 deg WSW; limit 45 (97 %); act before 13.0 m"
 
 
 def test_a_hole_that_cannot_be_brought_back_is_out_before_it_is_outside() -> None:
@@ -91,7 +92,7 @@ def test_it_is_never_green_on_what_is_doubtful_and_never_better_than_the_toleran
         assert end * LIMIT + 2.0 * std < LIMIT
     if worst >= 1.001:
         assert found.by_surveys is Word.OUT
-    assert line(found)
+    assert verdict_line(found)
 
 
 @given(end=st.floats(0.81, 2.0), bit=st.floats(0.0, LENGTH))
@@ -123,7 +124,7 @@ def test_north_is_0_and_east_is_90() -> None:
     [(44.1234, 0.2345, 44.12, 0.24), (44.1234, 12.3, 44.0, 13.0), (1.0, 0.0, 1.0, 0.0), (123.4, 123.4, 120.0, 130.0)],
 )
 def test_numbers_have_the_digits_that_they_are_worth(value: float, std: float, told: float, told_std: float) -> None:
-    assert rounded(value, std) == told
+    assert round_to_std(value, std) == told
     assert rounded_std(std) == told_std
 
 
@@ -133,8 +134,8 @@ def test_a_standard_deviation_is_never_told_smaller(std: float) -> None:
 
 
 def test_a_ground_station_that_knows_nothing_says_so(tmp_path: Path) -> None:
-    answer = verdict(RigModel(GroundConfig(folder=tmp_path)), {})
-    check_answer(answer, VERDICT)
+    answer = shown_on(RigModel(GroundConfig(folder=tmp_path)), "verdict")
+    check_answer(answer, fields_of_answer(VerdictAnswer))
     assert answer["verdict"] == "dont_know"
     assert answer["doubts"] == ["no_survey", "clock", "depth", "stale"]
     assert answer["line"] == "DON'T KNOW: no station has been surveyed yet"

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from itertools import islice
 
 import numpy as np
 import numpy.typing as npt
 
 from node.kernels.arithmetic.formats import PERIOD
-from sim.rig.direct_string import DirectString
+from sim.string.direct_string import DirectString
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 from telemetry.messages import Event, NodeState
 
 Sample = list[float]  # three rates (rad/s), three forces (m/s^2)
+NUMBERS = 6  # of a sample
 Spoil = Callable[[int, Sample], Sample]
 
 
@@ -42,11 +42,9 @@ class StringOfOne:
         }
         self.world = World(scenario_of(tables), seed)
         self.motion, self.cycles = self.world.motion, self.world.cycles
-        self.string = DirectString(
-            self.world, state_every=1, spoil=lambda _tube, cycle, sample: spoil(cycle, list(sample))
-        )
+        self.string, self._spoil = DirectString(self.world, state_every=1), spoil
         self.tube = self.string.tubes[1]
-        self._steps = self.string.steps()
+        self._steps, self._next = self.string.steps(), 0
 
     def turning(self, block: int, fraction: float = 0.5) -> int:
         """Cycle within the turning of a block, 0 its begin, 1 its end."""
@@ -62,8 +60,10 @@ class StringOfOne:
 
     def advance(self, cycles: int) -> StringOfOne:
         """So many cycles, or as many as are left."""
-        for _ in islice(self._steps, cycles):
-            pass
+        for cycle in range(self._next, min(self._next + cycles, self.cycles)):
+            reading = self.string.readings[cycle, 0, 0]
+            reading[:NUMBERS] = self._spoil(cycle, reading[:NUMBERS].tolist())
+            self._next = next(self._steps) + 1
         return self
 
     def shift_clock(self, seconds: float) -> None:

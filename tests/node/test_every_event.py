@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.record.events import Code
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import new_node
+from telemetry.frozen import replace
 from telemetry.messages import Aiding, Event
 
 G = 9.81

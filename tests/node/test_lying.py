@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from node.kernels.record.filter_record import Err
-from sim.rig.direct_string import DirectString
+from sim.string.direct_string import DirectString
 from sim.studies.field.cases import BLOCKS
 from sim.studies.field.run import chosen_cases
 from sim.world.scenario import scenario_of

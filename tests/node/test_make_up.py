@@ -1,7 +1,6 @@
 """The joint that was made up above a node: solved from the yaw it kept, from the marks, or from both."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
@@ -13,6 +12,7 @@ from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import forget_session, new_node
 from node.kernels.string.encoder_step import QUANTUM
+from telemetry.frozen import replace
 from telemetry.messages import Aiding, Event
 
 OLD = 0.05 * DEG  # of the mark between the head and this tube while it was on top

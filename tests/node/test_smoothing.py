@@ -19,7 +19,7 @@ from node.kernels.filter.revision import follow_revision, open_revision
 from node.kernels.filter.smoothing import begin_smoothing, propagate_survey_covariance
 from node.kernels.record.filter_record import STATES, CycleStatus, Err, default_config, new_state
 from node.kernels.record.node_record import SETTINGS, new_node
-from sim.rig.direct_string import Survey
+from sim.string.result import StringSurvey
 from sim.studies.scenarios import on_off
 
 OUTAGES = {"aiding": on_off(20.0, 60.0)}
@@ -80,7 +80,7 @@ def test_a_reset_leaves_no_covariance_with_the_survey(error: Err) -> None:
     assert np.count_nonzero(state["surveyed_with"]) == STATES - 1
 
 
-def last_words(string: StringOfOne) -> list[tuple[Survey, Survey]]:
+def last_words(string: StringOfOne) -> list[tuple[StringSurvey, StringSurvey]]:
     """Every survey that was said again, as it was said first and last."""
     run = string.string.run
     last = {revision.cycle: revision for revision in run.revisions}

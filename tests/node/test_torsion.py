@@ -1,7 +1,6 @@
 """What a node does about the twist of the string above it: handed on, gated or stated, waited for."""
 
 import math
-from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -15,6 +14,7 @@ from node.firmware.tube_settings import Kernel, MakeUpAngle, TorsionRule, TubeSe
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Err, Scheme, default_config
 from node.kernels.record.node_record import new_node
+from telemetry.frozen import replace
 from telemetry.messages import Aiding, Event, SurveyMeasurement
 
 STIFFNESS = 17_413.0  # N m/rad, 60/50 mm, 3 m

@@ -1,7 +1,6 @@
 """What a tube says and hands on."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ from node.firmware.tube_settings import MakeUpAngle, TubeSettings
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Scheme, default_config
 from node.kernels.record.node_record import new_node
+from telemetry.frozen import replace
 from telemetry.messages import Aiding, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
 
 DRIVE, LOWER = MakeUpAngle(0.5, 1e-3), MakeUpAngle(-0.2, 2e-3)

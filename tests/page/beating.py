@@ -13,8 +13,8 @@ from hand_fed import Rig
 from page_client import PASSWORD, free_port
 from served import Served, serving
 
+from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.gateway.page.passwords import hash_of
-from groundstation.gateway.page.settings import PageSettings
 
 BEAT_S = 0.5  # s between two moments of the rig, in which every tube speaks
 FROZEN_S = 120.0  # s, at most

@@ -21,7 +21,7 @@ from borechain.cli.ground.record_command import replay as replay_command
 from borechain.drilling.inline import InlineRig
 from groundstation.recording.ground_replay import replay_file
 from groundstation.recording.recording_file import NAME, RecordedSample, Recording, RecordingError, RecordingWriter
-from groundstation.service.answers.paths import schemas
+from groundstation.service.answers.answer_table import schemas_by_path
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import IntakeError, pack_intake, unpack_intake
 from sim.rig.ground_settings import ground_settings
@@ -244,7 +244,7 @@ def test_the_layout_names_topics_and_fields_that_there_are() -> None:
     assert len(named) == 6
     for path in named:
         topic, *fields = path.removeprefix(KEY).removesuffix("[:]").split(".")
-        schema = schemas()[topic]
+        schema = schemas_by_path()[topic]
         for name in fields:
             schema = next((one for one in schema.get("anyOf", []) if one.get("type") == "object"), schema)
             schema = schema["properties"][name]

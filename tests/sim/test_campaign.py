@@ -10,23 +10,24 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from given_inputs import CYCLE, GIVEN, HEARD, count_other_answers
 from hypothesis import given
 from hypothesis import strategies as st
+from node_by_node import drill_node_by_node
 
 from node.firmware.tube import Tube
 from node.kernels.record.node_record import AIDING, MOMENT, READING
 from node.kernels.step.address import firmware_addresses
 from sim.campaign import engine
 from sim.campaign.chunk import RUNS, Campaign, run_chunk, scenario_digest
-from sim.campaign.draws import draws_of, noise_of, tubes_of
-from sim.campaign.replay import CYCLE, GIVEN, HEARD, replay
 from sim.campaign.run import run_campaign
-from sim.campaign.sensors import new_work, read_sensors
 from sim.campaign.store import MANIFEST, Folder
 from sim.campaign.summary import OverRuns, Sum, honesty
 from sim.errors import RigError, ScenarioError
-from sim.rig.direct_string import DirectString
-from sim.rig.encoder_course import measured_of
+from sim.string.direct_string import DirectString
+from sim.string.drawn_string import frames_of
+from sim.world.disturbance.reading import DRAWN, read_sensors
+from sim.world.disturbance.records import make_shared, make_tubes
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
 
@@ -51,24 +52,23 @@ def scenario(**changed: dict[str, Any]) -> Scenario:
 def test_without_noise_every_sensor_reads_what_it_reads_in_the_world_of_a_rig() -> None:
     quiet = scenario(gyroscope=QUIET_GYRO | {"misalignment_std_deg": 0.3}, accelerometer=QUIET_FORCE)
     world, made = World(quiet, 5), Campaign(quiet)
-    noise, work, course = noise_of(quiet.file)[0], new_work(1), made.course
-    tubes = tubes_of(world, draws_of(world, measured_of(world)).frame)
-    felt = course.rate, course.force, course.circle, course.shaken
+    shared, reading, drawn = make_shared(quiet.file)[0], np.zeros((1, READING)), np.zeros(DRAWN)
+    tubes, powered = make_tubes(quiet.file, 5, frames_of(world)), made.string.schedule.powered
     for tube in (1, 2, 3):
         samples = world.sensors.samples(tube)
-        for cycle in np.flatnonzero(made.course.powered >= tube)[::7].tolist():
-            read_sensors(noise, tubes[tube - 1], False, 0.0, *felt, work.drawn, work.readings[0], int(cycle), tube - 1)
-            assert np.allclose(work.readings[0, 0, :6], samples[cycle], rtol=0.0, atol=2e-9), (tube, cycle)
+        for cycle in np.flatnonzero(powered >= tube)[::7].tolist():
+            felt, end = made.string.felt, float(world.ends[cycle])
+            read_sensors(shared, tubes[tube - 1], False, *felt, drawn, reading, end, int(cycle), tube - 1)
+            assert np.allclose(reading[0, :6], samples[cycle], rtol=0.0, atol=2e-9), (tube, cycle)
 
 
 def test_what_a_rig_gives_its_nodes_gives_the_same_nodes_here_bit_for_bit() -> None:
-    string = DirectString(World(scenario(), 2), spoil=lambda _tube, _cycle, sample: sample)  # so node by node
+    string = DirectString(World(scenario(), 2))
     heard = Listener()
     for place, tube in enumerate(string.tubes.values()):
         heard.listen(tube, place)
     before = string.nodes.copy()
-    string._hands_on = False
-    string.drill()
+    drill_node_by_node(string)
     rows = np.array(heard.rows, GIVEN)
     assert {CYCLE, HEARD} == set(rows["kind"].tolist())
     crews, corrections = zip(
@@ -77,7 +77,7 @@ def test_what_a_rig_gives_its_nodes_gives_the_same_nodes_here_bit_for_bit() -> N
     again = before.copy()
     taken = (np.array(heard.readings), np.array(heard.moments), np.array(heard.aidings))
     tables = (np.concatenate(crews), np.stack(corrections))
-    assert replay(*firmware_addresses(), again, *tables, rows, *taken) == 0
+    assert count_other_answers(*firmware_addresses(), again, *tables, rows, *taken) == 0
     assert same_bits(again, string.nodes)
     assert not same_bits(again, before)
 

@@ -6,7 +6,7 @@ from click.testing import CliRunner
 
 from borechain.cli.experiment.experiment import experiment
 from node.kernels.record.filter_record import Scheme
-from sim.rig.direct_string import DirectString
+from sim.string.direct_string import DirectString
 from sim.studies.consistency.run import EVERY, epoch_rows, judge_cells, run_study, setup_of
 from sim.studies.epochs import run_seed, sample_epochs
 from sim.studies.scenarios import Tables, change_sections

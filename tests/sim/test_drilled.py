@@ -11,7 +11,8 @@ import pytest
 
 from node.firmware.tube_settings import JointRule
 from node.kernels.arithmetic.formats import PERIOD
-from sim.rig.direct_string import DirectString, StringRun
+from sim.string.direct_string import DirectString
+from sim.string.result import StringRun
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from node.kernels.record.filter_record import Scheme
-from sim.rig.direct_string import DirectString
+from sim.string.direct_string import DirectString
 from sim.studies.epochs import resting_string, run_seed
 from sim.studies.relay.run import hop_rows, run_study
 from sim.world.scenario import scenario_of

@@ -5,7 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sim.rig.direct_string import DirectString, StringRun
+from sim.string.direct_string import DirectString
+from sim.string.result import StringRun
 from sim.studies.field.cases import BLOCKS, CASES
 from sim.studies.field.run import DisturbanceRun, chosen_cases, disturbance_row, judge_lowest_tube, run_seed
 from sim.world.scenario import scenario_of

@@ -13,14 +13,14 @@ from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Scheme
 from node.kernels.string.encoder_step import COUNTS_PER_TURN
 from node.process.tube_command import node
-from sim.rig.plain_encoder import LINES, PlainEncoder
+from sim.string.plain_encoder import LINES, PlainEncoder
 from sim.studies.ingredients import run as ingredients
 from sim.studies.lab import LAB, REST, ROTATING, LabRun
 from sim.studies.modes import run as modes
 from sim.studies.published_form import published_forms
 from sim.studies.scenarios import Tables, change_sections, on_off
 from sim.studies.trials import rms_deg
-from sim.world.imu_errors import SAMPLE_RATE_HZ, single_samples
+from sim.world.disturbance.white_noise import SAMPLE_RATE_HZ, densities
 from sim.world.scenario_file import GyroSection, NodeSection
 
 pytestmark = pytest.mark.slow
@@ -124,8 +124,8 @@ def test_a_plain_encoder_reads_the_middle_of_its_count() -> None:
 
 def test_a_single_sample_has_the_noise_of_its_band() -> None:
     gyroscope = GyroSection()
-    single = single_samples(gyroscope, PERIOD)
-    for one, mean in zip(single.noise_dps_rthz, gyroscope.noise_dps_rthz, strict=True):
+    single = densities(gyroscope.model_copy(update={"instantaneous": True}), PERIOD)
+    for one, mean in zip(single, gyroscope.noise_dps_rthz, strict=True):
         assert one / math.sqrt(PERIOD) == pytest.approx(mean * math.sqrt(SAMPLE_RATE_HZ))
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from node.kernels.arithmetic.formats import PERIOD
-from sim.rig.direct_string import DirectString, aiding_passes
+from sim.string.direct_string import DirectString
+from sim.string.schedule import aiding_passes
 from sim.studies import epochs
 from sim.studies.delay import run as delay
 from sim.studies.lab import ENDS, LAB, REST, ROTATING, STOP, LabRun, run_seed
@@ -134,7 +135,8 @@ def test_aiding_passes_as_its_scenario_says() -> None:
 def test_outages_reach_the_whole_string() -> None:
     tables = change_sections(epochs.resting_string(2, blocks=1, loss=0.0), aiding=on_off(20.0, 60.0))
     string = DirectString(World(scenario_of(dict(tables)), 1))
-    assert string.passes.mean() == pytest.approx(0.25, abs=0.1)
+    passes = string.schedule.is_sent
+    assert passes.mean() == pytest.approx(0.25, abs=0.1)
     run = string.drill()
-    silent = np.flatnonzero(~string.passes & run.turning)
+    silent = np.flatnonzero(~passes & run.turning)
     assert (run.var[silent[-1]] > run.var[silent[0]]).all()  # both nodes dead-reckon, nothing is lost but the encoder

@@ -5,12 +5,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from node_by_node import drill_node_by_node
 
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Scheme
 from node.kernels.step.address import BY_ADDRESS
 from sim.errors import ScenarioError
-from sim.rig.direct_string import DirectString, StringRun, aiding_passes
+from sim.string.direct_string import DirectString
+from sim.string.result import StringRun
+from sim.string.schedule import aiding_passes
 from sim.studies.epochs import resting_string
 from sim.world.scenario import scenario_of
 from sim.world.scenario_file import AidingSection
@@ -164,10 +167,10 @@ def test_a_string_without_frames_needs_a_link_that_is_off_and_fields_that_exist(
 @pytest.mark.parametrize("scheme", ["forward", "estimate"])
 @pytest.mark.parametrize("kernel", BY_ADDRESS)
 def test_a_string_in_one_call_is_the_string_node_by_node(scheme: str, kernel: str) -> None:
-    """A sample that is spoilt by nothing has every node stepped by itself."""
+    """As the processes of nodes call it: on readings and aidings that are messages."""
     wanted = dict(resting_string(3, Scheme[scheme.upper()], blocks=2, loss=0.2, kernel=kernel))
     together = DirectString(World(scenario_of(wanted), 3)).drill()
-    apart = DirectString(World(scenario_of(wanted), 3), spoil=lambda _tube, _cycle, sample: sample).drill()
+    apart = drill_node_by_node(DirectString(World(scenario_of(wanted), 3)))
     for name in ("yaw", "total_error", "var", "systematic_var", "gyro_bias"):
         np.testing.assert_array_equal(getattr(together, name), getattr(apart, name))
     assert together.events == apart.events

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sim.campaign.philox import normals, philox, uniforms
+from sim.world.disturbance.philox import normals, philox, uniforms
 
 # kat_vectors of the authors' library, philox4x32-10
 KNOWN = [

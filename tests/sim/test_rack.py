@@ -11,7 +11,7 @@ from groundstation.calibration.attitudes import true_vectors
 from node.kernels.arithmetic.formats import PERIOD
 from sim.errors import ScenarioError
 from sim.rig.scheduler import Progress, Scheduler
-from sim.world.imu_errors import Drift
+from sim.world.disturbance.drift import Drift
 from sim.world.rack import Rack
 from sim.world.scenario import Scenario, load_scenario
 from sim.world.scenario_file import CalibrationSection, DriftSection

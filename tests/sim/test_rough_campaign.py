@@ -7,24 +7,31 @@ from typing import Any
 
 import numpy as np
 import pytest
+from node_by_node import measure_by_firmware
 from scipy.signal import welch
 from scipy.stats import ks_2samp
 
 from node.kernels.record.filter_record import PARTS
 from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, READING, SPLIT, TEMPERATURE
 from sim.campaign.chunk import Campaign
-from sim.campaign.draws import draws_of, noise_of, tubes_of
-from sim.campaign.field import FINER, Field
-from sim.campaign.field_encoder import measured_in_field
-from sim.campaign.frames import read_frames, set_noise
-from sim.campaign.sensors import new_work
-from sim.campaign.vibration import Vibration
 from sim.errors import ScenarioError
-from sim.rig.direct_string import DirectString, aiding_vector
+from sim.string.direct_string import DirectString
+from sim.string.drawn_string import frames_of
+from sim.string.head_measurements import row_of_aiding
+from sim.string.rough_head import measured_in_field
 from sim.studies.epochs import epochs_of
 from sim.studies.scenarios import Tables, change_sections
 from sim.studies.worlds.run import rough_world
-from sim.world.rough_imu import RoughImu, band_noise, low_passed
+from sim.world.disturbance import fifo
+from sim.world.disturbance.frame_layout import FINER
+from sim.world.disturbance.frame_sums import Field
+from sim.world.disturbance.frame_vibration import Vibration
+from sim.world.disturbance.low_pass import low_passed
+from sim.world.disturbance.reading import DRAWN, read_frames
+from sim.world.disturbance.records import make_shared, make_tubes
+from sim.world.disturbance.row import OneImu
+from sim.world.disturbance.vibration import band_noise
+from sim.world.disturbance.white_noise import add_part_noise
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
 
@@ -69,12 +76,12 @@ def alike(monkeypatch: pytest.MonkeyPatch) -> Callable[[Field], None]:
     """Have the frames of a world's FIFOs come when those of a campaign's run do, to which half a place is nothing."""
 
     def follow(field: Field) -> None:
-        def frame_times(self: RoughImu, _sensor: Any) -> np.ndarray:
-            front, fifo = field.front_end[0], field.fifos[self._key[0] - 1]
-            first = front["first"] + front["frame"] * (fifo["row"] + fifo["share"]) / FINER
-            return np.arange(first, self._t[-1], front["frame"])
+        def frame_times(imu: OneImu, t: np.ndarray) -> np.ndarray:
+            front, own = field.front_end[0], field.fifos[imu.tube - 1]
+            first = front["first"] + front["frame"] * (own["row"] + own["share"]) / FINER
+            return np.arange(first, t[-1], front["frame"])
 
-        monkeypatch.setattr(RoughImu, "_frame_times", frame_times)
+        monkeypatch.setattr(fifo, "frame_times", frame_times)
 
     return follow
 
@@ -92,19 +99,18 @@ def test_without_noise_every_sensor_reads_what_it_reads_in_the_rough_world(
     drawn = load_scenario(Path("rough")) if name == "rough" else field_of(gyroscope={"misalignment_std_deg": 0.3})
     scenario = without_noise(drawn)
     world, made = World(scenario, 5), Campaign(scenario)
-    assert made.rough is not None
-    run, noise, work = made.rough.run(world), noise_of(scenario.file)[0], new_work(1)
+    assert made.string.rough is not None
+    run, shared = made.string.rough.run(world), make_shared(scenario.file)[0]
+    reading, drawn_numbers = np.zeros((1, READING)), np.zeros(DRAWN)
     alike(run.field)
-    tubes = tubes_of(world, draws_of(world, run.measured).frame)
+    tubes = make_tubes(scenario.file, 5, frames_of(world))
     for tube in range(1, scenario.tubes + 1):
         found = world.sensors.rough_cycles(tube)
         rows = np.zeros((world.cycles, READING))
         for cycle in range(world.cycles):
-            end = float(world.ends[cycle] + tubes[tube - 1]["phase"])
-            read_frames(
-                noise, tubes[tube - 1], False, 0.0, run.field, work.drawn, work.readings[0], end, cycle, tube - 1
-            )
-            rows[cycle] = work.readings[0, 0]
+            end = float(world.ends[cycle] + world.phase(tube))
+            read_frames(shared, tubes[tube - 1], False, run.field, drawn_numbers, reading, end, cycle, tube - 1)
+            rows[cycle] = reading[0]
         off = np.abs(rows[:, :6] - found.readings)
         assert off[:, :3].max() < 1e-4
         assert off[:, 3:].max() < 1e-3
@@ -125,15 +131,15 @@ def test_without_noise_the_nodes_err_as_those_of_a_rig_of_the_same_seed(alike: C
     """To 0.002 deg in the median; a node that decides otherwise by a hair is still within half a sigma."""
     scenario = without_noise(field_of(rig={"tubes": 3}, aiding={"on_s": 20.0, "off_s": 30.0}))
     made, apart = Campaign(scenario), []
-    assert made.rough is not None
+    assert made.string.rough is not None
     for seed in (1, 2, 3):
-        alike(made.rough.run(World(scenario, seed)).field)
+        alike(made.string.rough.run(World(scenario, seed)).field)
         rig = DirectString(World(scenario, seed)).drill()
         surveys, epochs = made.run(seed)
         at = np.searchsorted(rig.ends, surveys["at"], side="right") - 1
         assert sorted((s.cycle, s.tube) for s in rig.surveys) == sorted(zip(at.tolist(), surveys["tube"], strict=True))
         cycle = np.searchsorted(rig.ends, epochs["at"], side="right") - 1
-        place = made.course.powered[cycle] - epochs["hop"]
+        place = made.string.schedule.powered[cycle] - epochs["hop"]
         sigma = np.sqrt(rig.total_var[cycle, place])
         assert np.all(np.abs(epochs["yaw_error"] - rig.total_error[cycle, place]) < 0.5 * sigma)
         apart += (epochs["yaw_error"] - rig.total_error[cycle, place]).tolist()
@@ -147,7 +153,7 @@ def test_noise_of_the_parts_of_a_window_is_that_of_its_frames() -> None:
     shares = [np.clip(np.minimum(b, frames + 1.0) - np.maximum(a, frames), 0.0, 1.0) for a, b in pairwise(borders)]
     noises = np.zeros((20_000, PARTS + 1))
     for noise in noises:
-        set_noise(noise, borders, PARTS + 1, 2.0, random.standard_normal(), random.standard_normal(2 * PARTS))
+        add_part_noise(noise, borders, PARTS + 1, 2.0, random.standard_normal(), random.standard_normal(2 * PARTS))
     wanted = 4.0 * np.array(shares) @ np.array(shares).T
     assert np.allclose(np.cov(noises.T), wanted, rtol=0.0, atol=0.02 * wanted.max())
 
@@ -156,12 +162,14 @@ def test_the_encoder_measures_what_it_measures_in_the_rough_world() -> None:
     scenario = without_noise(field_of())
     world, rough_of = World(scenario, 3), scenario.file.rough
     assert rough_of is not None
-    said = np.array([aiding_vector(aiding) for aiding in DirectString(world)._measured])
+    said = np.array([row_of_aiding(aiding) for aiding in measure_by_firmware(world)])
     moved = world.rough_run.moved
     assert np.array_equal(measured_in_field(world, rough_of.encoder, moved.t, moved.head), said)
     made = Campaign(scenario)
-    assert made.rough is not None
-    assert np.allclose(made.rough.run(world).measured, said, rtol=0.0, atol=1e-9)  # of a head that starts at 0, turned
+    assert made.string.rough is not None
+    assert np.allclose(
+        made.string.rough.run(world).measured, said, rtol=0.0, atol=1e-9
+    )  # of a head that starts at 0, turned
 
 
 def test_frames_of_a_vibration_have_the_spectrum_of_the_worlds() -> None:

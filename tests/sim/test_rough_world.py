@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from sim.errors import ScenarioError
 from sim.studies.scenarios import change_sections, complete_string
 from sim.world.borehole import Borehole
+from sim.world.disturbance.converter import FORCE_CLIPPED
+from sim.world.disturbance.vibration import band_noise
 from sim.world.rough_disc import RoughDisc
-from sim.world.rough_imu import FORCE_CLIPPED, band_noise
 from sim.world.rough_motion import RoughMotion
 from sim.world.rough_section import RoughEncoderSection, RoughSection
 from sim.world.rough_truth import transported

@@ -8,10 +8,13 @@ import pytest
 
 from node.kernels.arithmetic.formats import PERIOD
 from sim.errors import ScenarioError
-from sim.world.imu_errors import ImuErrors, gauss_markov, quantise
+from sim.world.disturbance.converter import clip_rates, quantise
+from sim.world.disturbance.reading import read_means
+from sim.world.disturbance.row import ImuSamples, OneImu
+from sim.world.disturbance.wander import gauss_markov
 from sim.world.marks import wrap
 from sim.world.scenario import load_scenario
-from sim.world.scenario_file import AccelerometerSection, GyroSection
+from sim.world.scenario_file import GyroSection
 from sim.world.world import World
 from telemetry.messages import BASE, ENCODER, Side
 
@@ -47,14 +50,22 @@ def test_white_noise_is_the_angle_random_walk() -> None:
         resolution_dps=0.0,
     )
     zero = np.zeros((100_000, 3))
-    readings = ImuErrors(gyro, AccelerometerSection()).gyro(np.random.default_rng(1), zero, zero, PERIOD)
+    readings = read_means(ImuSamples(zero[:, 0], zero, zero, zero[:, 0]), one_imu(gyro))[:, :3]
     expected = np.radians(np.array(gyro.noise_dps_rthz)) / math.sqrt(PERIOD)
     np.testing.assert_allclose(readings.std(axis=0), expected, rtol=0.02)
 
 
 def test_a_gyroscope_saturates_and_has_steps() -> None:
     rates = np.radians(np.array([[-900.0, 0.0014, 900.0]]))
-    np.testing.assert_allclose(np.degrees(quantise(rates, 0.0026, 500.0)), [[-500.0, 0.0026, 500.0]], atol=1e-9)
+    samples, imu = ImuSamples(np.zeros(1), rates, rates, np.zeros(1)), one_imu(GyroSection(resolution_dps=0.0026))
+    for act in (quantise, clip_rates):
+        act(samples, imu, None)
+    np.testing.assert_allclose(np.degrees(samples.rate), [[-500.0, 0.0026, 500.0]], atol=1e-9)
+
+
+def one_imu(gyroscope: GyroSection) -> OneImu:
+    """An IMU of a plain world with this gyroscope."""
+    return OneImu(SCENARIO.file.model_copy(update={"gyroscope": gyroscope}), 1, 1)
 
 
 def test_readings_of_the_marks_explain_the_yaw_but_for_the_systematic_error() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime
 import random
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import get_args
@@ -14,6 +13,7 @@ from borechain.pki.rig_keys import add_tube, init_rig
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seals import Keys, Seals
 from telemetry.errors import DecodeError
+from telemetry.frozen import replace
 from telemetry.messages import (
     BASE,
     ENCODER,

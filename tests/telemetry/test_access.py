@@ -12,7 +12,7 @@ import pytest
 from rigs import free_endpoint
 from sealed_string import make_folder
 
-from borechain.client import connect, live_rigs
+from borechain.client import connect_to_ground, live_rigs
 from borechain.pki.access import read_access
 from telemetry import keys
 from telemetry.application.seals import seals_of
@@ -140,12 +140,12 @@ def test_an_operator_hears_the_ground_station_and_no_port(buses: dict[str, Zenoh
 
 def test_a_client_shows_its_certificate(folder: Path, endpoint: str, buses: dict[str, ZenohBus]) -> None:
     buses["base"].liveliness_token(keys.LEASE.format(rig=RIG, holder="base"))
-    with connect(endpoint, RIG, WAIT, keys_place=folder) as ground:
+    with connect_to_ground(endpoint, RIG, WAIT, keys_place=folder) as ground:
         assert live_rigs(ground._bus) == [RIG]
         assert answers(ground._bus, ORDER) == []
-    with connect(endpoint, RIG, WAIT, keys_place=folder, role="driller") as ground:
+    with connect_to_ground(endpoint, RIG, WAIT, keys_place=folder, role="driller") as ground:
         assert answers(ground._bus, ORDER) == [b"answered"]
-    with pytest.raises(MediumError, match="expected --keys with it"), connect(endpoint, RIG):
+    with pytest.raises(MediumError, match="expected --keys with it"), connect_to_ground(endpoint, RIG):
         pass
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,6 +12,7 @@ from sim.can.wire import CanWire
 from telemetry.application.can_load import AIDING, CYCLE, HEADER, STATE, bus_load, load_table, steady_traffic
 from telemetry.application.end_seal import content_of_sealed
 from telemetry.application.seals import Seals, seals_of
+from telemetry.frozen import replace
 from telemetry.media.can_exchange import CanExchange
 from telemetry.media.can_frame import EXTENDED, IDENTIFIER, CanFrame
 from telemetry.media.can_timing import BitRates

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from messages_of_schema import MESSAGES
 
 from telemetry.application.can_load import RepeatedMessage, steady_traffic
 from telemetry.errors import DecodeError, EncodeError
+from telemetry.frozen import replace
 from telemetry.media.can_identifier import Identifier
 from telemetry.media.can_profile import NativePart
 from telemetry.messages import Aiding, Command, Hello, Mode, NodeState, TimeReply, TimeRequest
@@ -158,7 +158,7 @@ ODD = (0.0, -0.0, math.inf, -math.inf, math.nan, 1, -1, 2**60, True, None, "x", 
 @given(cyclic(), st.data(), st.booleans())
 def test_compiled_and_field_by_field_say_the_same(message: Any, data: st.DataObject, fd: bool) -> None:
     native = native_of(message)
-    values = values_of_opened(open_payload(encode(message)))
+    values = list(values_of_opened(open_payload(encode(message))))
     if data.draw(st.booleans()):
         values[data.draw(st.integers(0, len(values) - 1))] = data.draw(st.sampled_from(ODD))
     form = native.form(fd=fd)
@@ -175,7 +175,7 @@ def test_compiled_and_field_by_field_say_the_same(message: Any, data: st.DataObj
 @pytest.mark.parametrize("fd", [False, True])
 def test_what_comes_all_the_time_takes_the_compiled_way(traffic: RepeatedMessage, fd: bool) -> None:
     native = native_of(traffic.message)
-    values = values_of_opened(open_payload(encode(traffic.message)))
+    values = list(values_of_opened(open_payload(encode(traffic.message))))
     data = native.packers[fd](values, 17)
     assert data is not None
     assert native.unpackers[fd](data) is not None
@@ -387,4 +387,4 @@ def test_a_bundle_is_rounded_as_its_messages_are() -> None:
     assert before[0] == after[0]
     assert after[1][0] == [0, encode(rounded(AIDING))]
     assert rounded_frame(b"garbage") == b"garbage"
-    assert {f.name for f in fields(Aiding)} - set(UNSAID) == set(NATIVE[Kind.AIDING].signals)
+    assert set(Aiding.__struct_fields__) - set(UNSAID) == set(NATIVE[Kind.AIDING].signals)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 
 from sim.can.wire import CanWire
 from telemetry.application.endpoint import Endpoint
+from telemetry.frozen import replace
 from telemetry.media.can_exchange import CanExchange
 from telemetry.media.can_frame import EXTENDED, IDENTIFIER, CanFrame
 from telemetry.media.port import MAX_FRAME

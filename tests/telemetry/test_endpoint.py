@@ -1,7 +1,6 @@
 """A chain of stations over joints with troubles: base, encoder and tubes."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,6 +11,7 @@ from sealed_string import state
 from telemetry.application.delivery_rules import PRIORITIES
 from telemetry.application.end_to_end import KEPT_WAIT
 from telemetry.application.endpoint import Endpoint, Received
+from telemetry.frozen import replace
 from telemetry.media.memory import MemoryPort, joined_ports
 from telemetry.media.port import PortFrame
 from telemetry.messages import (

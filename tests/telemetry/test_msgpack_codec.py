@@ -1,4 +1,3 @@
-import dataclasses
 import json
 import math
 import re
@@ -13,6 +12,7 @@ from hypothesis import strategies as st
 from messages_of_schema import MESSAGES, messages
 
 from telemetry.errors import DecodeError, EncodeError
+from telemetry.frozen import replace
 from telemetry.messages import (
     BASE,
     MAX_SEGMENTS,
@@ -43,7 +43,7 @@ GOLDEN = json.loads((Path(__file__).parent / "golden" / "payloads.json").read_te
 def test_the_schema_names_every_field_of_every_message_once() -> None:
     assert [spec.kind for spec in SCHEMA] == list(Kind)
     for spec in SCHEMA:
-        assert [field.name for field in spec.fields] == [field.name for field in dataclasses.fields(spec.message)]
+        assert [field.name for field in spec.fields] == list(spec.message.__struct_fields__)
         assert len({field.key for field in spec.fields}) == len(spec.fields)
         assert all(field.meaning and field.key for field in spec.fields)
 
@@ -102,13 +102,14 @@ def test_what_looks_like_a_state_is_one_of_that_tube_or_refused(state: NodeState
         opened = open_payload(bytes(payload))
     except DecodeError:
         return
-    is_as_written = opened.kind is Kind.NODE_STATE and list(opened.rows)[:3] == ["v", "k", "o"]
+    rows = msgpack.unpackb(bytes(payload), strict_map_key=False)
+    is_as_written = opened.kind is Kind.NODE_STATE and list(rows)[:3] == ["v", "k", "o"]
     assert found == (opened.origin if is_as_written else None)
 
 
 @given(MESSAGES[Aiding])
 def test_aiding_is_said_in_the_earliest_version_that_can(aiding: Aiding) -> None:
-    aiding = dataclasses.replace(aiding, epoch=0, seal=b"")
+    aiding = replace(aiding, epoch=0, seal=b"")
     twisted = bool(aiding.torque or aiding.torsion_var or aiding.under_torque)
     rows = msgpack.unpackb(encode(aiding))
     assert rows["v"] == (2 if twisted else 1)
@@ -117,7 +118,7 @@ def test_aiding_is_said_in_the_earliest_version_that_can(aiding: Aiding) -> None
 
 @given(MESSAGES[Aiding])
 def test_aiding_of_an_old_node_is_read_as_that_of_a_rigid_string(aiding: Aiding) -> None:
-    rigid = dataclasses.replace(aiding, torque=0.0, torsion_var=0.0, under_torque=False, epoch=0, seal=b"")
+    rigid = replace(aiding, torque=0.0, torsion_var=0.0, under_torque=False, epoch=0, seal=b"")
     rows = msgpack.unpackb(encode(rigid))
     rows["b"] |= {"q": 5.0, "tv": 1.0, "u": True}  # keys that version 1 does not know
     assert decode(msgpack.packb(rows)) == rigid
@@ -126,7 +127,7 @@ def test_aiding_of_an_old_node_is_read_as_that_of_a_rigid_string(aiding: Aiding)
 @given(MESSAGES[NodeState])
 def test_a_state_is_said_as_before_there_was_what_it_does_not_use(state: NodeState) -> None:
     """Neither an alignment nor a radio costs a byte where there is none."""
-    state = dataclasses.replace(state, epoch=0, numbered=0)
+    state = replace(state, epoch=0, numbered=0)
     aligned = state.alignment != (0.0, 0.0, 0.0)
     by_radio = min(state.upper_margin, state.lower_margin) < math.inf
     rows = msgpack.unpackb(encode(state))
@@ -140,10 +141,10 @@ def test_a_state_is_said_as_before_there_was_what_it_does_not_use(state: NodeSta
     ("message", "version", "named"),
     [
         (TimeRequest(3.0), 2, "time_request: expected version 1, got 2"),
-        (Receipt(3, 4), 6, "schema version 1 to 5, got 6"),
-        (Receipt(3, 4), 0, "schema version"),
-        (Receipt(3, 4), True, "schema version"),
-        (Aiding(1.0, 1e-8, 0.0, 0.0, 0.0, 1.0, 1, 0), 2, "torque"),
+        (Receipt(3, 4), 6, "^payload: version: .*<= 5"),
+        (Receipt(3, 4), 0, "^payload: version: .*>= 1"),
+        (Receipt(3, 4), True, "^payload: version: .*bool"),
+        (Aiding(1.0, 1e-8, 0.0, 0.0, 0.0, 1.0, 1, 0), 2, "^Aiding: torque: "),
     ],
 )
 def test_a_version_that_is_not_known_or_lacks_its_fields_is_refused(message: Any, version: int, named: str) -> None:
@@ -199,21 +200,21 @@ def test_a_wrong_value_in_the_right_shape_is_refused_or_within_range(message: An
     ("change", "named"),
     [
         ({"v": 5}, "payload: receipt: expected version 4, got 5"),
-        ({"v": None}, "payload: expected schema version 1 to 5, got None"),
-        ({"k": 99}, "payload: unknown kind 99"),
-        ({"k": True}, "payload: unknown kind True"),
-        ({"o": -1}, "payload: envelope field o: expected 0..255, got -1"),
-        ({"o": 256, "t": "x"}, "payload: envelope field o: expected 0..255, got 256"),
-        ({"t": 1e9}, "payload: envelope field t: expected 0..255, got 1000000000.0"),
-        ({"t": False}, "payload: envelope field t: expected 0..255, got False"),
-        ({"s": "x"}, f"payload: envelope field s: expected 0..{2**53}, got 'x'"),
-        ({"s": 2**53 + 1}, f"payload: envelope field s: expected 0..{2**53}, got {2**53 + 1}"),
-        ({"b": 3}, "Receipt: expected a map of fields, got 3"),
+        ({"v": None}, "payload: version: Expected `int`, got `None`"),
+        ({"k": 99}, "payload: kind: Invalid enum value 99"),
+        ({"k": True}, "payload: kind: Expected `int`, got `bool`"),
+        ({"o": -1}, "payload: origin: Expected `int` >= 0"),
+        ({"o": 256, "t": "x"}, "payload: origin: Expected `int` <= 255"),
+        ({"t": 1e9}, "payload: target: Expected `int`, got `float`"),
+        ({"t": False}, "payload: target: Expected `int`, got `bool`"),
+        ({"s": "x"}, "payload: sequence: Expected `int`, got `str`"),
+        ({"s": 2**53 + 1}, f"payload: sequence: Expected `int` <= {2**53}"),
+        ({"b": 3}, "Receipt: Expected `object`, got `int`"),
     ],
 )
 def test_a_wrong_envelope_is_refused_by_name(change: dict[str, Any], named: str) -> None:
     rows = msgpack.unpackb(encode(Receipt(3, 4))) | change
-    with pytest.raises(DecodeError, match=f"^{re.escape(named)}$"):
+    with pytest.raises(DecodeError, match=f"^{re.escape(named)}"):
         decode(msgpack.packb(rows))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import datetime
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from telemetry.application.end_seal import OVERHEAD as END_OVERHEAD
 from telemetry.application.measurement_seal import MeasurementSeal
 from telemetry.application.seal_watch import SealWatch
 from telemetry.application.seals import Keys, Seals
+from telemetry.frozen import replace
 from telemetry.media.credentials import DEPTH_SOURCE
 from telemetry.messages import BASE, ENCODER, DepthReading, Event, Severity, Side
 from telemetry.presentation.msgpack_codec import encode
@@ -147,7 +147,7 @@ def forgeries(folder: Path, count: int) -> int:
         believed += base.joints[Side.LOWER].open(body + tag, string.now) is not None
         believed += base.hear(payload[: END_HEAD.size] + tag + payload[END_OVERHEAD:], 1, string.now).is_believed
         believed += base.depth_content(reading[: END_HEAD.size] + tag + reading[END_OVERHEAD:]) is not None
-        believed += tube.measurement.admits(dataclasses.replace(measured, seal=b"\x01" + tag), 1, string.now)
+        believed += tube.measurement.admits(replace(measured, seal=b"\x01" + tag), 1, string.now)
     return believed
 
 
@@ -270,11 +270,11 @@ def test_a_measurement_that_is_forged_or_old_is_refused(folder: Path) -> None:
     ring = Keys(key_file(folder, ENCODER), ENCODER).current
     encoder, tube = MeasurementSeal(ring), MeasurementSeal(Keys(key_file(folder, 1), 1).current)
     sealed = encoder.close(aiding(5, 100.0))
-    assert tube.admits(dataclasses.replace(sealed, offset=1.0, hops=3, systematic_var=1.0, torsion_var=2.0), 1, 100.1)
+    assert tube.admits(replace(sealed, offset=1.0, hops=3, systematic_var=1.0, torsion_var=2.0), 1, 100.1)
     assert tube.admits(sealed, 1, 100.2)  # the same measurement again
     changes = ({"yaw": 2.0}, {"yaw_var": 1e-7}, {"rate": 0.2}, {"valid_at": 100.05}, {"sequence": 6}, {"torque": 1.0})
     for change in (*changes, {"under_torque": True}, {"epoch": 2}, {"seal": b""}):
-        assert not tube.admits(dataclasses.replace(sealed, **change), 1, 100.2)  # type: ignore[arg-type]
+        assert not tube.admits(replace(sealed, **change), 1, 100.2)  # type: ignore[arg-type]
     assert not tube.admits(encoder.close(aiding(4, 100.1)), 1, 100.2)
     assert not tube.admits(encoder.close(aiding(6, 90.0)), 1, 100.2)
     assert not MeasurementSeal(Keys(key_file(folder, 1), 1).current).admits(sealed, 1, 200.0)  # after its restart

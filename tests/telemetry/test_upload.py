@@ -1,6 +1,5 @@
 """Segments of a block: who made them, how they are gathered and what the sender repeats."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from telemetry.errors import KeyFileError
+from telemetry.frozen import replace
 from telemetry.messages import MAX_SEGMENTS, SEGMENT_SIZE, BlockSegment, BlockStatus, UploadPhase
 from telemetry.transport.authentication import is_authentic, new_key, read_key, sealed_segment
 from telemetry.transport.upload import FIRST_RETRY, LAST_RETRY, UNTRUSTED_LIMIT, Assembly, Upload, split_block

@@ -14,7 +14,7 @@ from borechain.cli.shared_options import json_option, seed_option
 from telemetry.runtime.process_options import endpoint_option
 
 if TYPE_CHECKING:
-    from groundstation.gateway.page.settings import PageSettings
+    from groundstation.gateway.page.page_settings import PageSettings
 
 page_option = click.option(
     "--page", "address", metavar="HOST:PORT", default="127.0.0.1:8080", show_default=True, help="Address of the page."
@@ -63,11 +63,11 @@ def page(tubes: int, browsers: int, terminals: int, seconds: float, address: str
 
 def free_page(address: str, endpoint: str) -> PageSettings:
     """Settings of a page at ``address``, checked to be free like the endpoint; a plain error otherwise."""
-    from groundstation.gateway.page.settings import PageSettings, listen, parse_address
+    from groundstation.gateway.page.page_settings import PageSettings, open_page_socket, parse_address
     from sim.rig.launcher import check_port_free
 
     served = PageSettings(*parse_address(address))
-    listen(served).close()
+    open_page_socket(served).close()
     check_port_free(endpoint)
     return served
 

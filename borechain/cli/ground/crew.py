@@ -31,10 +31,10 @@ def crew(rig_name: str, endpoint: str, keys_place: Path | None, role: str, by: s
       borechain crew --rig rig-2 --by anna
       borechain crew --endpoint tls/10.0.0.7:7447 --keys stick --role driller
     """
-    from borechain.client import connect
+    from borechain.client import connect_to_ground
     from borechain.crew.app import CrewApp
 
-    with connect(endpoint, rig_name, keys_place=keys_place, role=role) as ground:
+    with connect_to_ground(endpoint, rig_name, keys_place=keys_place, role=role) as ground:
         CrewApp(ground, rig_name, by or user_name()).run()
 
 

@@ -63,7 +63,7 @@ def query(
       borechain query 'borechain/rig-1/ground/stations' --csv > stations.csv
       borechain query 'borechain/rig-1/cmd/take_survey?tube=3'
     """
-    from borechain.client import who_is_there
+    from borechain.rig_search import who_is_there
     from telemetry.media.credentials import credentials_for
     from telemetry.media.zenoh_bus import open_client
 
@@ -93,18 +93,15 @@ def csv_of(answers: list[QueryReply]) -> str:
     InputFault
         When there are several answers, or the one has no rows.
     """
-    from telemetry.runtime.command_line import check_installed
-
-    check_installed("scipy")
     from groundstation.errors import SelectorError
+    from groundstation.service.answers.answer_table import find_answer
     from groundstation.service.answers.csv_tables import table_of
-    from groundstation.service.answers.paths import fields_of
 
     if len(answers) != 1:
         raise InputFault(f"--csv: expected one answer, got {len(answers)}: {', '.join(one.key for one in answers[:5])}")
     path = answers[0].key.partition("/ground/")[2]
     try:
-        return table_of(path, fields_of(path), json.loads(answers[0].payload))
+        return table_of(path, find_answer(path).fields, json.loads(answers[0].payload))
     except SelectorError as error:
         raise InputFault(f"--csv: {error}") from error
 
@@ -201,7 +198,9 @@ def value_of(payload: bytes) -> Any:
 
 def known_keys(kind: str = "query") -> str:
     """Which keys can be asked for, or are published."""
-    return f"keys are {', '.join(key.template for key in keys.TABLE if kind in key.kind)}"
+    from groundstation.service.answers.answer_table import known_keys
+
+    return f"keys are {', '.join(key.template for key in known_keys() if kind in key.kind)}"
 
 
 def show_answers(values: dict[str, Any], *, as_json: bool) -> None:

@@ -19,7 +19,7 @@ from telemetry import keys
 from telemetry.runtime.process_options import insecure_option, secure_endpoint
 
 if TYPE_CHECKING:
-    from groundstation.gateway.page.settings import PageSettings
+    from groundstation.gateway.page.page_settings import PageSettings
     from telemetry.media.zenoh_bus import ZenohBus
 
 SCENARIO = Path("demo")
@@ -53,14 +53,14 @@ def demo(page: str, speed: float, endpoint: str, rounds: int | None) -> None:
     """
     from borechain.drilling.drill_hole import page_with_password
     from borechain.drilling.rig_host import opened_router
-    from groundstation.gateway.page.settings import listen
+    from groundstation.gateway.page.page_settings import open_page_socket
     from sim.rig.launcher import check_port_free
     from sim.world.shipped import find_scenario
 
     settings = page_settings(PageRequest(page))
     if settings is None:
         return
-    listen(settings).close()
+    open_page_socket(settings).close()
     check_port_free(endpoint)
     served = page_with_password(settings, print_notice)
     click.echo(f"open {served.url} in a browser; Ctrl-C ends the demonstration")

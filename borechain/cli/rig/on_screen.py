@@ -15,7 +15,7 @@ import click
 
 from borechain.cli.faults import EnvironmentFault, InputFault
 from borechain.cli.ground.crew import user_name
-from borechain.client import Ground, connect
+from borechain.client import Ground, connect_to_ground
 from telemetry.errors import MediumError
 
 ONE_TRY = 2.0  # wall s to join the rig's endpoint before looking whether the rig still lives
@@ -57,7 +57,7 @@ def join_ground(
         while ground is None and process.poll() is None:
             with contextlib.suppress(MediumError):
                 ground = stack.enter_context(
-                    connect(endpoint, rig_name, ONE_TRY, keys_place=keys_place, role="driller")
+                    connect_to_ground(endpoint, rig_name, ONE_TRY, keys_place=keys_place, role="driller")
                 )
         yield ground
 

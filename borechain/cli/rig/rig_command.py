@@ -111,7 +111,7 @@ def checked_job(job: RigJob, page: PageRequest) -> RigJob:
     RigError, PageError
         An address that is taken.
     """
-    from groundstation.gateway.page.settings import listen
+    from groundstation.gateway.page.page_settings import open_page_socket
     from sim.rig.launcher import check_port_free
     from sim.world.shipped import find_scenario
 
@@ -125,7 +125,7 @@ def checked_job(job: RigJob, page: PageRequest) -> RigJob:
     if served is not None:
         if job.inline:
             raise InputFault("--page: expected a rig of processes with it; nothing can be asked with --inline")
-        listen(served).close()
+        open_page_socket(served).close()
     if not job.inline:
         check_port_free(job.endpoint)
     return replace(job, served=served)

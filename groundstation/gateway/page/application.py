@@ -18,17 +18,17 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 from starlette.types import Receive, Scope, Send
 
-from groundstation.gateway.page.doors import Doors
-from groundstation.gateway.page.guard import GuardMiddleware, RequestError
-from groundstation.gateway.page.hub import Hub
-from groundstation.gateway.page.openapi import document
-from groundstation.gateway.page.settings import PageSettings
+from groundstation.gateway.page.answer_hub import Hub
+from groundstation.gateway.page.openapi import openapi_document
+from groundstation.gateway.page.page_handlers import PageHandlers
+from groundstation.gateway.page.page_settings import PageSettings
+from groundstation.gateway.page.request_guard import GuardMiddleware, RequestError
 from groundstation.service.process.ground_process import GroundProcess
 
 FILES = Path(__file__).parent / "static"
 
 
-class Stream:
+class EventStream:
     """The address of the stream as a plain application: no part of it is kept back."""
 
     def __init__(self, follow: Callable[[Scope, Receive, Send], Awaitable[None]]) -> None:
@@ -49,12 +49,12 @@ class Files(StaticFiles):
         return response
 
 
-def application(process: GroundProcess, page: PageSettings, hub: Hub) -> Starlette:
+def page_application(process: GroundProcess, page: PageSettings, hub: Hub) -> Starlette:
     """Everything that the page's address serves."""
-    doors = Doors(process, page, hub, build(), program_version())
+    handlers = PageHandlers(process, page, hub, files_digest(), program_version())
 
     async def described(_request: Request) -> Response:
-        return JSONResponse(document(program_version()))
+        return JSONResponse(openapi_document(program_version()))
 
     async def shell(_request: Request) -> Response:
         return FileResponse(FILES / "index.html", headers={"cache-control": "no-cache"})
@@ -74,24 +74,24 @@ def application(process: GroundProcess, page: PageSettings, hub: Hub) -> Starlet
             Route("/alive", alive),
             Mount("/static", Files(directory=FILES)),
             Route("/api/openapi.json", described),
-            Route("/api/session", doors.session, methods=["GET"]),
-            Route("/api/session", doors.sign_in, methods=["POST"]),
-            Route("/api/session", doors.sign_out, methods=["DELETE"]),
-            Route("/api/stream", Stream(doors.stream)),
-            Route("/api/cmd/{name}", doors.order, methods=["POST"]),
-            Route("/api/tables/{path:path}.csv", doors.table),
-            Route("/api/reports/{subject}.pdf", doors.report),
-            Route("/api/{path:path}", doors.answer),
+            Route("/api/session", handlers.session, methods=["GET"]),
+            Route("/api/session", handlers.sign_in, methods=["POST"]),
+            Route("/api/session", handlers.sign_out, methods=["DELETE"]),
+            Route("/api/stream", EventStream(handlers.stream)),
+            Route("/api/cmd/{name}", handlers.order, methods=["POST"]),
+            Route("/api/tables/{path:path}.csv", handlers.table),
+            Route("/api/reports/{subject}.pdf", handlers.report),
+            Route("/api/{path:path}", handlers.answer),
         ],
         middleware=[
             Middleware(GuardMiddleware),
             Middleware(TrustedHostMiddleware, allowed_hosts=list(page.names), www_redirect=False),
         ],
-        exception_handlers={RequestError: refused, HTTPException: not_served, Exception: failed},
+        exception_handlers={RequestError: refuse_request, HTTPException: not_served, Exception: failed},
     )
 
 
-async def refused(_request: Request, error: Exception) -> Response:
+async def refuse_request(_request: Request, error: Exception) -> Response:
     """What is wrong with a request, in a line."""
     if not isinstance(error, RequestError):
         raise error
@@ -117,7 +117,7 @@ def program_version() -> str:
         return "0"
 
 
-def build() -> str:
+def files_digest() -> str:
     """Name of the files as they are: a page of another build loads itself anew."""
     digest = hashlib.sha256()
     for path in sorted(FILES.rglob("*.*")):

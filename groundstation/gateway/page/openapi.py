@@ -8,9 +8,8 @@ from typing import Any
 
 from groundstation.gateway.page.passwords import ROLES
 from groundstation.gateway.page.reports import SUBJECTS
-from groundstation.service.answers.answer_fields import object_schema
-from groundstation.service.answers.key_fields import HEADER, ORDER
-from groundstation.service.answers.paths import FIXED, MEMBERS, Member, Path
+from groundstation.service.answers.answer_table import ANSWERS, AnswerKey
+from groundstation.service.answers.shapes.answer_fields import object_schema
 from telemetry.application.arguments import shown_name
 from telemetry.application.commands import COMMANDS, CommandSpec
 from telemetry.quantities import ValueKind
@@ -42,10 +41,12 @@ SESSION = {
 }
 
 
-def document(version: str) -> View:
+def openapi_document(version: str) -> View:
     """The whole document."""
-    answers = {f"/api/{pattern}": {"get": asked(pattern, path)} for pattern, path in (FIXED | MEMBERS).items()}
-    orders = {f"/api/cmd/{name}": {"post": ordered(name)} for name in dict.fromkeys(spec.name for spec in COMMANDS)}
+    answers = {f"/api/{pattern}": {"get": answer_operation(answer)} for pattern, answer in ANSWERS.items()}
+    orders = {
+        f"/api/cmd/{name}": {"post": command_operation(name)} for name in dict.fromkeys(spec.name for spec in COMMANDS)
+    }
     return {
         "openapi": "3.1.0",
         "info": {
@@ -54,26 +55,23 @@ def document(version: str) -> View:
             "description": "The keys of one rig over HTTP. Reading needs no session on loopback; ordering needs one of "
             "the role driller, and its csrf value in the header x-csrf-token.",
         },
-        "paths": answers | tables() | reports() | orders | session_paths() | stream_path(),
+        "paths": answers | table_paths() | report_paths() | orders | session_paths() | stream_path(),
         "components": {"securitySchemes": {"session": {"type": "apiKey", "in": "cookie", "name": "borechain"}}},
     }
 
 
-def asked(pattern: str, path: Path | Member) -> View:
+def answer_operation(answer: AnswerKey) -> View:
     """One answer."""
-    inside = [
-        {"name": name, "in": "path", "required": True, "schema": {"type": "integer"}}
-        for name in re.findall(r"\{([a-z]+)\}", pattern)
-    ]
-    query = path.parameters if isinstance(path, Path) else ()
+    inside = [{"name": name, "in": "path", "required": True, "schema": {"type": "integer"}} for name in answer.numbers]
+    query = [{"name": name, "in": "query", "schema": {"type": "string"}} for name in answer.parameters]
     return {
-        "operationId": "ask_" + re.sub(r"[^a-z_]+", "_", pattern).strip("_"),
-        "parameters": inside + [{"name": name, "in": "query", "schema": {"type": "string"}} for name in query],
-        "responses": {"200": content_of("the answer", object_schema(path.fields))} | refusals(400, 401, 404),
+        "operationId": "ask_" + re.sub(r"[^a-z_]+", "_", answer.path).strip("_"),
+        "parameters": inside + query,
+        "responses": {"200": content_of("the answer", object_schema(answer.fields))} | error_responses(400, 401, 404),
     }
 
 
-def tables() -> View:
+def table_paths() -> View:
     """Answers with a list of rows as files of CSV."""
     text = {"text/csv": {"schema": {"type": "string"}}}
     return {
@@ -81,14 +79,14 @@ def tables() -> View:
             "get": {
                 "operationId": f"table_{name}",
                 "responses": {"200": {"description": "the rows of the answer, with a header", "content": text}}
-                | refusals(400, 401),
+                | error_responses(400, 401),
             }
         }
         for name in TABLES
     }
 
 
-def reports() -> View:
+def report_paths() -> View:
     """Reports to be signed as PDF."""
     pdf = {"application/pdf": {"schema": {"type": "string", "format": "binary"}}}
     return {
@@ -96,19 +94,19 @@ def reports() -> View:
             "get": {
                 "operationId": f"report_{subject}",
                 "responses": {"200": {"description": f"what is known of the {subject} now", "content": pdf}}
-                | refusals(401, 404, 409, 501, 503),
+                | error_responses(401, 404, 409, 501, 503),
             }
         }
         for subject in SUBJECTS
     }
 
 
-def ordered(name: str) -> View:
+def command_operation(name: str) -> View:
     """One command, with all its actions."""
     specs = [spec for spec in COMMANDS if spec.name == name]
     schemas = [arguments_of(spec) for spec in specs]
     body = schemas[0] if len(schemas) == 1 else {"oneOf": schemas}
-    order = object_schema((*HEADER, *ORDER))
+    order = object_schema(ANSWERS["orders/{n}"].fields)
     return {
         "operationId": f"order_{name}",
         "description": "; ".join(f"{spec.action}: {spec.meaning}" if spec.action else spec.meaning for spec in specs),
@@ -127,7 +125,7 @@ def ordered(name: str) -> View:
             "200": content_of("the order, answered", order),
             "202": content_of("the order; its course is /api/orders/{n}", order),
         }
-        | refusals(400, 401, 403, 408, 413, 415),
+        | error_responses(400, 401, 403, 408, 413, 415),
     }
 
 
@@ -163,12 +161,12 @@ def session_paths() -> View:
             "post": {
                 "operationId": "sign_in",
                 "requestBody": body,
-                "responses": shown | refusals(400, 401, 403, 408, 413, 415, 429),
+                "responses": shown | error_responses(400, 401, 403, 408, 413, 415, 429),
             },
             "delete": {
                 "operationId": "sign_out",
                 "security": [{"session": []}],
-                "responses": shown | refusals(401, 403),
+                "responses": shown | error_responses(401, 403),
             },
         }
     }
@@ -182,7 +180,7 @@ def stream_path() -> View:
         "/api/stream": {
             "get": {
                 "operationId": "follow",
-                "responses": {"200": {"description": told, "content": text}} | refusals(401, 503),
+                "responses": {"200": {"description": told, "content": text}} | error_responses(401, 503),
             }
         }
     }
@@ -193,6 +191,6 @@ def content_of(description: str, schema: View) -> View:
     return {"description": description, "content": {"application/json": {"schema": schema}}}
 
 
-def refusals(*statuses: int) -> View:
+def error_responses(*statuses: int) -> View:
     """Responses that say in a line what is wrong."""
     return {str(status): content_of("refused, and why", REFUSED) for status in statuses}

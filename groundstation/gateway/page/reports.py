@@ -7,10 +7,10 @@ import hashlib
 from datetime import UTC, datetime
 
 from groundstation.errors import GroundError
-from groundstation.gateway.page.guard import RequestError
+from groundstation.gateway.page.request_guard import RequestError
 from groundstation.service.answers.csv_tables import table_of
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.paths import find
+from groundstation.service.answers.paths import find_path
 from groundstation.service.answers.wall_views import stations_of
 from groundstation.service.hole.live_wall import Neighbourhood
 
@@ -19,7 +19,7 @@ REPORT_WITHIN_S = 20.0  # that one takes on a slow machine, the first after a st
 Inputs = list[tuple[str, str]]
 
 
-class Reporter:
+class ReportTypesetter:
     """Sets one report at a time, beside the loop that drives the ground station.
 
     Parameters
@@ -48,7 +48,7 @@ class Reporter:
         if self._is_busy:
             raise RequestError(503, "another report is being made", retry_after=REPORT_WITHIN_S)
         found = wall.judged(stations_of(self._model), self._model.depths.latest)
-        stations = find(self._model, "stations")
+        stations = find_path(self._model, "stations")
         text = table_of("stations", stations.fields, stations.show(self._model, {}))
         inputs = [*wall.inputs, ("the stations of this rig", hashlib.sha256(text.encode()).hexdigest())]
         self._is_busy = True

@@ -10,9 +10,9 @@ from collections.abc import AsyncIterator, Iterator
 
 import uvicorn
 
-from groundstation.gateway.page.application import application
-from groundstation.gateway.page.hub import Hub
-from groundstation.gateway.page.settings import PageSettings
+from groundstation.gateway.page.answer_hub import Hub
+from groundstation.gateway.page.application import page_application
+from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.service.process.ground_process import GroundProcess
 
 CONNECTIONS = 200  # at a time; a later one is told to come again
@@ -64,7 +64,7 @@ class Sweeper:
         self._found = found
 
 
-class Keeper:
+class ServerSupervisor:
     """Keeps a web server on a listening socket: one that fails is told to the crew, and another one follows.
 
     Parameters
@@ -115,7 +115,7 @@ async def serving_page(process: GroundProcess, page: PageSettings, listening: so
     """Have the page served on a listening socket while the context lasts."""
     hub = Hub(process, is_replay=bool(page.replay))
     config = uvicorn.Config(
-        application(process, page, hub),
+        page_application(process, page, hub),
         http="h11",
         ws="none",
         lifespan="off",
@@ -132,11 +132,11 @@ async def serving_page(process: GroundProcess, page: PageSettings, listening: so
     quiet = logging.getLogger("uvicorn.error")  # what it would write is in the answer already, or concerns no user
     quiet.addHandler(logging.NullHandler())
     quiet.propagate = False
-    keeper = Keeper(process, config, listening)
-    keeping = asyncio.create_task(keeper.run())
+    supervisor = ServerSupervisor(process, config, listening)
+    keeping = asyncio.create_task(supervisor.run())
     try:
         yield
     finally:
         hub.close()
-        keeper.end()
+        supervisor.end()
         await asyncio.gather(keeping, return_exceptions=True)

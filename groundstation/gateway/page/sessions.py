@@ -15,7 +15,7 @@ FORGOTTEN_S = 900.0  # s after which wrong passwords of an address no longer cou
 
 
 @dataclass(frozen=True, slots=True)
-class Session:
+class OperatorSession:
     """One sign-in, valid until ``ends_at`` (s); every order must repeat ``csrf``."""
 
     token: str
@@ -29,17 +29,17 @@ class Sessions:
     """Sessions by the token in the browser's cookie; times are seconds of a monotonic clock."""
 
     def __init__(self) -> None:
-        self._sessions: OrderedDict[str, Session] = OrderedDict()
+        self._sessions: OrderedDict[str, OperatorSession] = OrderedDict()
 
-    def begin(self, role: str, name: str, now: float) -> Session:
+    def begin(self, role: str, name: str, now: float) -> OperatorSession:
         """Begin and return a session of a role under a name."""
-        session = Session(secrets.token_urlsafe(32), secrets.token_urlsafe(32), role, name, now + VALID_S)
+        session = OperatorSession(secrets.token_urlsafe(32), secrets.token_urlsafe(32), role, name, now + VALID_S)
         self._sessions[session.token] = session
         while len(self._sessions) > SESSIONS:
             self._sessions.popitem(last=False)
         return session
 
-    def find(self, token: str | None, now: float) -> Session | None:
+    def find(self, token: str | None, now: float) -> OperatorSession | None:
         """Session of a token that has not ended."""
         session = self._sessions.get(token or "")
         if session is not None and session.ends_at <= now:
@@ -47,12 +47,12 @@ class Sessions:
             return None
         return session
 
-    def end(self, session: Session) -> None:
+    def end(self, session: OperatorSession) -> None:
         """End a session."""
         self._sessions.pop(session.token, None)
 
 
-def is_from(session: Session, csrf: str | None) -> bool:
+def is_from(session: OperatorSession, csrf: str | None) -> bool:
     """Whether a request carries what only our own page knows of the session."""
     return hmac.compare_digest(session.csrf.encode(), (csrf or "").encode())
 

@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 
 from groundstation.errors import SelectorError
 from groundstation.service.alarms.rig_alarms import Level
-from telemetry.frozen import quickly_made
 
 OPEN_AT_MOST = 40  # alarms that are not cleared
 CLEARED_KEPT = 200
@@ -39,7 +38,6 @@ class State(enum.StrEnum):
     CLEARED = "cleared"
 
 
-@quickly_made
 @dataclass(frozen=True, slots=True)
 class Times:
     """One moment: s of the own clock, of rig time (NaN where it is not known), and UTC since 1970."""
@@ -49,7 +47,6 @@ class Times:
     utc: float
 
 
-@quickly_made
 @dataclass(frozen=True, slots=True)
 class Condition:
     """Something that is wrong now: what, where (m along the hole), towards which azimuth (rad), beyond what."""

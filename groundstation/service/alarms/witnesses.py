@@ -12,9 +12,9 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Collection
-from dataclasses import replace
 
 from telemetry.application.series import SERIES_SHIFT
+from telemetry.frozen import replace
 from telemetry.messages import EPOCH_UNKNOWN, Event
 
 AGAINST_THE_ENCODER = ("yaw_reset", "gyro_step", "gyro_scale")

@@ -7,7 +7,7 @@ import io
 from typing import Any
 
 from groundstation.errors import SelectorError
-from groundstation.service.answers.answer_fields import AnswerField, Fields
+from groundstation.service.answers.shapes.answer_fields import AnswerField, Fields
 
 View = dict[str, Any]
 
@@ -27,7 +27,7 @@ def table_of(path: str, fields: Fields, view: View) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow([".".join(names) for names in columns])
-    writer.writerows([cell(row, names) for names in columns] for row in view[lists[0].name])
+    writer.writerows([csv_cell(row, names) for names in columns] for row in view[lists[0].name])
     return out.getvalue()
 
 
@@ -47,7 +47,7 @@ def is_cell(field: AnswerField) -> bool:
     return field.kind not in ("object", "map") and field.rank <= 1
 
 
-def cell(row: View, names: tuple[str, ...]) -> Any:
+def csv_cell(row: View, names: tuple[str, ...]) -> Any:
     """Value of one cell; empty for null."""
     value: Any = row
     for name in names:

@@ -1,7 +1,7 @@
-"""What the keys of the measurements hold: degrees, metres and seconds, the unit in every name.
+"""Views of the measurements: degrees, metres and seconds, the unit in every name.
 
-A hole has ten thousand surveys, and no other query is answered while all are shown: their rows are read column
-by column, and no survey becomes an object on the way.
+A hole has ten thousand surveys, and no other question is answered while all of them are shown: their rows are read
+column by column, and no survey becomes an object on the way.
 """
 
 from __future__ import annotations
@@ -9,14 +9,23 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
+from groundstation.service.answers.answer_texts import json_of, listed_texts
+from groundstation.service.answers.answer_views import member_view_of, view_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.row_texts import Numbers
-from groundstation.service.answers.streamed_rows import span
-from groundstation.service.answers.views import Parameters, Range, View, flag_names, streamed
+from groundstation.service.answers.selector_range import SelectorRange
+from groundstation.service.answers.shapes.answer_fields import filled_columns
+from groundstation.service.answers.shapes.hole_shapes import (
+    MeasurementRow,
+    MeasurementsAnswer,
+    StationMeasurementsAnswer,
+)
+from groundstation.service.answers.streamed_rows import Parameters, is_streamed, window_limits
+from groundstation.service.answers.string_views import flag_names
 from groundstation.service.hole.resolved_stops import NO_NUMBER, Table, forces_of
 from groundstation.survey.fusion.resolve import Quality, angle_stds_of_all, direction_angles
 from groundstation.survey.fusion.survey_trust import Trust
@@ -26,53 +35,56 @@ DEGREES = 180.0 / math.pi  # in a radian
 NO_ROWS: Final = np.empty(0, np.int64)
 
 
-def measurements(k: RigModel, p: Parameters) -> View:
-    """Every cluster; ``station`` and ``tube`` select, ``since`` and ``limit`` give them as they came."""
-    rows, stations = _selected(k, p)
-    return {
-        "newest": k.seen["measurements"],
-        "measurements": measurement_rows(k.hole.surveys, rows.tolist(), stations.tolist()),
-    }
+def answer_measurements_text(k: RigModel, p: Parameters) -> bytes:
+    """JSON of ``answer_measurements``.
 
-
-def measurements_text(k: RigModel, p: Parameters) -> bytes:
-    """JSON of ``measurements``. A row shows something else once it is revised, or a station comes above its own."""
-    surveys = k.hole.surveys
+    A row shows something else once it is revised, or a station comes above its own.
+    """
+    surveys, newest = k.hole.surveys, k.seen["measurements"]
     rows, stations = _selected(k, p)
 
-    def render(places: Numbers) -> list[View]:
+    def render(places: Numbers) -> list[MeasurementRow]:
         return measurement_rows(surveys, rows[places].tolist(), stations[places].tolist())
 
     texts = k.measurement_texts.texts_of(rows, np.stack([surveys.column("number")[rows], stations], axis=1), render)
-    return b'{"newest":%d,"measurements":[%b]}' % (k.seen["measurements"], b",".join(texts))
+    return json_of(MeasurementsAnswer(newest, listed_texts(texts)))
+
+
+@view_of(MeasurementsAnswer, answer_measurements_text)
+def answer_measurements(k: RigModel, p: Parameters) -> MeasurementsAnswer:
+    """Every cluster; ``station`` and ``tube`` select, ``since`` and ``limit`` give them as they came."""
+    surveys, newest = k.hole.surveys, k.seen["measurements"]
+    rows, stations = _selected(k, p)
+    return MeasurementsAnswer(newest, measurement_rows(surveys, rows.tolist(), stations.tolist()))
+
+
+@member_view_of(StationMeasurementsAnswer, lambda k: range(1, len(k.stations) + 1))
+def answer_station_measurements(k: RigModel, n: int) -> StationMeasurementsAnswer:
+    """Every cluster of one station."""
+    surveys, rows = k.hole.surveys, k.stations[n - 1].clusters.table_rows.tolist()
+    return StationMeasurementsAnswer(n, measurement_rows(surveys, rows, [n] * len(rows)))
 
 
 def _selected(k: RigModel, p: Parameters) -> tuple[Numbers, Numbers]:
     """Rows (n,) of the table that the parameters select, and the numbers of their stations."""
-    since, limit = span(k.seen["measurements"], p) if streamed(p) else (0, None)
-    by_station = Range.parse("station", p["station"]) if "station" in p else None
-    by_tube = Range.parse("tube", p["tube"]) if "tube" in p else None
-    chosen = [(n, one) for n, one in enumerate(k.stations, 1) if by_station is None or by_station.holds(n)]
+    known, table, newest = k.stations, k.hole.surveys, k.seen["measurements"]
+    since, limit = window_limits(newest, p) if is_streamed(p) else (0, None)
+    by_station = SelectorRange.of_parameter("station", p)
+    chosen = [(n, one) for n, one in enumerate(known, 1) if by_station.holds(n)]
     rows = np.concatenate([NO_ROWS, *(one.clusters.table_rows for _, one in chosen)])
     stations = np.repeat([n for n, _ in chosen], [one.count for _, one in chosen]).astype(np.int64)
-    table = k.hole.surveys
     keeps = table.column("number")[rows] > since
-    if by_tube is not None:
+    if "tube" in p:
+        by_tube = SelectorRange.parse("tube", p["tube"])
         keeps &= np.fromiter(map(by_tube.holds, table.column("tube")[rows].tolist()), np.bool_, len(rows))
     rows, stations = rows[keeps], stations[keeps]
-    if streamed(p):
+    if is_streamed(p):
         order = np.argsort(table.column("number")[rows], kind="stable")[:limit]
         rows, stations = rows[order], stations[order]
     return rows, stations
 
 
-def station_measurements(k: RigModel, n: int) -> View:
-    """Every cluster of one station."""
-    rows = k.stations[n - 1].clusters.table_rows.tolist()
-    return {"station": n, "measurements": measurement_rows(k.hole.surveys, rows, [n] * len(rows))}
-
-
-def measurement_rows(surveys: Table, rows: Sequence[int], stations: Sequence[int]) -> list[View]:
+def measurement_rows(surveys: Table, rows: Sequence[int], stations: Sequence[int]) -> list[MeasurementRow]:
     """Surveys in some rows of the table, each resolved and with the number of its station."""
     if not rows:
         return []
@@ -103,8 +115,12 @@ def measurement_rows(surveys: Table, rows: Sequence[int], stations: Sequence[int
         "trust": [_trust_name(trust) for trust in table["trust"].tolist()],
         "quality": [_quality_names(quality) for quality in table["quality"].tolist()],
     }
-    values = (column.tolist() if isinstance(column, np.ndarray) else column for column in columns.values())
-    return [dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
+    return filled_columns(MeasurementRow, {name: plain_column(column) for name, column in columns.items()})
+
+
+def plain_column(column: Any) -> list[Any]:
+    """Values of a column as Python's own."""
+    return list(column.tolist() if isinstance(column, np.ndarray) else column)
 
 
 @functools.cache

@@ -1,136 +1,108 @@
-"""The answerable paths below ``ground/``: what each shows, its fields and the parameters it takes."""
+"""The paths below ``ground/`` that have an answer now: each with its line of the table and with what makes it."""
 
 from __future__ import annotations
 
-import re
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
-
-import orjson
+from types import ModuleType
+from typing import Any, Final
 
 from groundstation.errors import SelectorError
 from groundstation.service.answers import (
     alarm_views,
     column_views,
-    key_fields,
+    hole_views,
     measurement_views,
     order_views,
+    recalibration_views,
+    string_views,
     verdict_views,
-    views,
     wall_views,
 )
-from groundstation.service.answers.answer_fields import Fields, object_schema
+from groundstation.service.answers.answer_table import (
+    ANSWERS,
+    NUMBER,
+    AnswerKey,
+    find_answer,
+    schemas_by_path,
+    split_number,
+)
+from groundstation.service.answers.answer_texts import finite_or_none, json_of, plain_answer, utc_text
+from groundstation.service.answers.answer_views import MAKERS, view_of
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.streamed_rows import STREAMED
-from groundstation.service.answers.views import Parameters, View, finite, utc_text
+from groundstation.service.answers.shapes.answer_fields import Fields
+from groundstation.service.answers.shapes.string_shapes import AnswerHeader, SchemaAnswer
+from groundstation.service.answers.streamed_rows import Parameters
 
-LONGEST_NUMBER = 18  # digits
+# each tells ``MAKERS`` of its views when it is imported
+VIEWS: Final[tuple[ModuleType, ...]] = (
+    alarm_views,
+    column_views,
+    hole_views,
+    measurement_views,
+    order_views,
+    recalibration_views,
+    string_views,
+    verdict_views,
+    wall_views,
+)
 SHOWN = 30  # numbers that a refusal names
-_NUMBER = re.compile(r"\{[a-z]+\}")
-
-
-def _station_numbers(k: RigModel) -> range:
-    return range(1, len(k.stations) + 1)
 
 
 @dataclass(frozen=True, slots=True)
-class Path:
-    """One answerable path below ``ground/``: what it shows, its fields, and which parameters it takes.
+class AnsweredPath:
+    """One path that has an answer now; ``number`` is its member's."""
 
-    One that shows the hole alone changes with a survey only, and is asked for far more often.
-    """
+    answer: AnswerKey
+    number: int | None = None
 
-    view: Callable[[RigModel, Parameters], View]
-    own: Fields
-    parameters: tuple[str, ...] = ()
-    is_of_the_hole: bool = False
-    text: Callable[[RigModel, Parameters], bytes] | None = None  # JSON of ``view``, where rows of it are kept as such
-
-    def show(self, k: RigModel, p: Parameters) -> View:
-        """The whole answer: what every answer has, and the view."""
-        return header(k) | self.view(k, p)
+    def show(self, k: RigModel, p: Parameters) -> dict[str, Any]:
+        """The whole answer as plain objects: what every answer has, and what its view makes."""
+        return dict(plain_answer(answer_header(k)) | plain_answer(self.view(k, p)))
 
     def json(self, k: RigModel, p: Parameters) -> bytes:
         """The whole answer as JSON; of the hole the text of the last time, behind a header of now."""
-        if self.text is not None:
-            text = self.text(k, p)
-        elif self.is_of_the_hole and not p:
-            text = k.last_shown(self.view, lambda: orjson.dumps(self.view(k, p)))
+        if (text_of := MAKERS[self.answer.shape].text) is not None:
+            text = text_of(k, p)
+        elif self.answer.of_the_hole and not p:
+            text = k.last_shown(self.answer.path, lambda: json_of(self.view(k, p)))
         else:
-            return orjson.dumps(self.show(k, p))
-        return orjson.dumps(header(k))[:-1] + b"," + text[1:]
+            text = json_of(self.view(k, p))
+        return json_of(answer_header(k))[:-1] + b"," + text[1:]
+
+    def view(self, k: RigModel, p: Parameters) -> Any:
+        """What stands behind the header."""
+        return MAKERS[self.answer.shape].view(k, p if self.number is None else self.number)
 
     @property
     def fields(self) -> Fields:
         """Fields of the whole answer."""
-        return (*key_fields.HEADER, *self.own)
+        return self.answer.fields
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Parameters that it takes."""
+        return self.answer.parameters
 
     @property
     def is_stream(self) -> bool:
         """Whether its rows are numbered in the order of their coming; only new ones are published."""
-        return STREAMED[0] in self.parameters
+        return self.answer.is_stream
 
 
-def header(k: RigModel) -> View:
+def answer_header(k: RigModel) -> AnswerHeader:
     """What every answer begins with."""
-    return {"revision": k.revision, "utc": utc_text(time.time()), "rig_time_s": finite(k.rig_now)}
+    return AnswerHeader(k.revision, utc_text(time.time()), finite_or_none(k.rig_now))
 
 
-@dataclass(frozen=True, slots=True)
-class Member:
-    """Paths of one pattern, one a member: the numbers that there are, and what the path of one shows."""
-
-    numbers: Callable[[RigModel], Iterable[int]]
-    view: Callable[[RigModel, int], View]
-    own: Fields
-
-    @property
-    def fields(self) -> Fields:
-        """Fields of the answer of one member."""
-        return (*key_fields.HEADER, *self.own)
-
-    def path(self, number: int) -> Path:
-        """The path of one member."""
-        return Path(lambda k, _p: self.view(k, number), self.own)
+@view_of(SchemaAnswer)
+def answer_schemas(_k: RigModel, _p: Parameters) -> SchemaAnswer:
+    """JSON schema of every answer."""
+    return SchemaAnswer(schemas_by_path())
 
 
-FIXED: dict[str, Path] = {
-    "status": Path(views.status, key_fields.STATUS),
-    "verdict": Path(verdict_views.verdict, key_fields.VERDICT),
-    "string": Path(views.string, key_fields.STRING),
-    "stations": Path(views.stations, key_fields.STATIONS, ("md",), is_of_the_hole=True),
-    "measurements": Path(
-        measurement_views.measurements,
-        key_fields.MEASUREMENTS,
-        ("station", "tube", *STREAMED),
-        text=measurement_views.measurements_text,
-    ),
-    "trajectory": Path(views.trajectory, key_fields.TRAJECTORY, ("md",), is_of_the_hole=True),
-    "events": Path(views.events, key_fields.EVENTS, ("tube", *STREAMED)),
-    "static_records": Path(views.static_records, key_fields.STATIC_RECORDS, ("tube", *STREAMED)),
-    "uncertainty": Path(column_views.uncertainty, key_fields.UNCERTAINTY, ("confidence",), is_of_the_hole=True),
-    "column": Path(column_views.column, key_fields.COLUMN, ("moment",), is_of_the_hole=True),
-    "history": Path(column_views.history, key_fields.HISTORY, ("points",)),
-    "wall": Path(wall_views.wall, key_fields.WALL),
-    "alarms": Path(alarm_views.alarms, key_fields.ALARMS),
-    "recalibration": Path(views.recalibration, key_fields.RECALIBRATION),
-    "orders": Path(order_views.orders, key_fields.ORDERS),
-    "changes": Path(views.changes, key_fields.CHANGES),
-    "schema": Path(lambda _k, _p: {"schemas": schemas()}, key_fields.SCHEMA),
-}
-MEMBERS: dict[str, Member] = {
-    "nodes/{tube}": Member(lambda k: sorted(k.nodes), views.node, key_fields.NODE),
-    "stations/{n}": Member(_station_numbers, views.station, key_fields.STATION),
-    "stations/{n}/measurements": Member(
-        _station_numbers, measurement_views.station_measurements, key_fields.STATION_MEASUREMENTS
-    ),
-    "orders/{n}": Member(lambda k: [known.number for known in k.orders], order_views.order, key_fields.ORDER),
-}
-PATTERNS = (*FIXED, *MEMBERS)
-
-
-def find(k: RigModel, path: str) -> Path:
+def find_path(k: RigModel, path: str) -> AnsweredPath:
     """The path, if it has an answer now.
 
     Raises
@@ -138,39 +110,23 @@ def find(k: RigModel, path: str) -> Path:
     SelectorError
         When it has none; it lists those that can have one.
     """
-    if path in FIXED:
-        return FIXED[path]
-    pattern, number = _parted(path)
-    member = MEMBERS.get(pattern)
-    if member is None:
-        raise SelectorError(f"{path}: no such path; expected one of {', '.join(PATTERNS)}")
-    numbers = list(member.numbers(k))
+    answer = find_answer(path)
+    if not answer.numbers:
+        return AnsweredPath(answer)
+    number, numbers = split_number(path)[1], list(numbers_of(k, answer))
     if number not in numbers:
         there_are = ", ".join(map(str, numbers[-SHOWN:])) or "none yet"
-        raise SelectorError(f"{path}: no such number; of {pattern} there are {there_are}")
-    return member.path(number)
+        raise SelectorError(f"{path}: no such number; of {answer.path} there are {there_are}")
+    return AnsweredPath(answer, number)
 
 
-def fields_of(path: str) -> Fields:
-    """Fields of the answer of a path, whether it has one now or not.
-
-    Raises
-    ------
-    SelectorError
-        When there is no such path.
-    """
-    known = FIXED.get(path) or MEMBERS.get(_parted(path)[0])
-    if known is None:
-        raise SelectorError(f"{path}: no such path; expected one of {', '.join(PATTERNS)}")
-    return known.fields
+def numbers_of(k: RigModel, answer: AnswerKey) -> Iterable[int]:
+    """Numbers of the members that there are of a path with a number."""
+    numbers = MAKERS[answer.shape].numbers
+    return () if numbers is None else numbers(k)
 
 
-def is_of_the_hole(path: str) -> bool:
-    """Whether a path shows the whole hole, and so changes with a survey only."""
-    return path in FIXED and FIXED[path].is_of_the_hole
-
-
-def check_parameters(found: Iterable[Path], parameters: Parameters, common: tuple[str, ...] = ()) -> None:
+def check_parameters(found: Iterable[AnsweredPath], parameters: Parameters, common: tuple[str, ...] = ()) -> None:
     """Refuse a parameter that none of the paths asked for takes; ``common`` are those of every path.
 
     Raises
@@ -184,24 +140,29 @@ def check_parameters(found: Iterable[Path], parameters: Parameters, common: tupl
             raise SelectorError(f"parameter {name}: expected {'one of ' + ', '.join(known) if known else 'none'}")
 
 
-def schemas() -> dict[str, View]:
-    """JSON schema of the answer of every path."""
-    return {pattern: object_schema(path.fields) for pattern, path in (FIXED | MEMBERS).items()}
-
-
-def paths(k: RigModel) -> dict[str, Path]:
+def answered_paths(k: RigModel) -> dict[str, AnsweredPath]:
     """Every path that has an answer now."""
-    found = dict(FIXED)
-    for pattern, member in MEMBERS.items():
-        for number in member.numbers(k):
-            found[_NUMBER.sub(str(number), pattern)] = member.path(number)
+    found: dict[str, AnsweredPath] = {}
+    for path, answer in ANSWERS.items():
+        if not answer.numbers:
+            found[path] = AnsweredPath(answer)
+        for number in numbers_of(k, answer) if answer.numbers else ():
+            found[NUMBER.sub(str(number), path)] = AnsweredPath(answer, number)
     return found
 
 
-def _parted(path: str) -> tuple[str, int]:
-    """Pattern and number of a path such as ``stations/3/measurements``; an empty pattern for any other."""
-    parts = path.split("/")
-    if len(parts) < 2 or not parts[1].isdecimal() or len(parts[1]) > LONGEST_NUMBER:
-        return "", 0
-    name = "{tube}" if parts[0] == "nodes" else "{n}"
-    return "/".join([parts[0], name, *parts[2:]]), int(parts[1])
+def check_views() -> None:
+    """Refuse a table with an answer that nothing makes.
+
+    Raises
+    ------
+    TypeError
+        Naming path and class.
+    """
+    for path, answer in ANSWERS.items():
+        maker = MAKERS.get(answer.shape)
+        if maker is None or (maker.numbers is None) != (not answer.numbers):
+            raise TypeError(f"{path}: expected a view of {answer.shape.__name__} among {', '.join(map(str, VIEWS))}")
+
+
+check_views()

@@ -12,21 +12,21 @@ DIGITS = 2  # significant, of a standard deviation
 FINEST = 6  # places behind the point
 
 
-def places(std: float) -> int:
+def decimal_places(std: float) -> int:
     """Places behind the point (negative: before it) to which ``std``, and what it belongs to, is worth telling."""
     if not math.isfinite(std) or std <= 0.0:
         return FINEST
     return min(DIGITS - 1 - math.floor(math.log10(std)), FINEST)
 
 
-def rounded(value: float, std: float) -> float:
+def round_to_std(value: float, std: float) -> float:
     """A value to the places that its standard deviation is worth."""
-    return round(value, places(std))
+    return round(value, decimal_places(std))
 
 
 def rounded_std(std: float) -> float:
     """A standard deviation to two digits, rounded up: it is never told smaller than it is."""
     if not math.isfinite(std) or std <= 0.0:
         return std
-    step = 10.0 ** -places(std)
-    return round(math.ceil(std / step - 1e-9) * step, max(places(std), 0))
+    step = 10.0 ** -decimal_places(std)
+    return round(math.ceil(std / step - 1e-9) * step, max(decimal_places(std), 0))

@@ -20,7 +20,7 @@ class RowTexts:
         self._texts = np.empty(0, np.object_)
         self._marks: Numbers = np.empty((0, marks), np.int64)
 
-    def texts_of(self, rows: Numbers, marks: Numbers, render: Callable[[Numbers], list[dict[str, Any]]]) -> list[bytes]:
+    def texts_of(self, rows: Numbers, marks: Numbers, render: Callable[[Numbers], list[Any]]) -> list[bytes]:
         """JSON of ``rows`` (n,) of a table, in their order.
 
         Parameters

@@ -1,17 +1,19 @@
-"""What the key of the verdict holds: every number with as many digits as its uncertainty is worth."""
+"""View of the verdict: every number with as many digits as its uncertainty is worth."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from groundstation.service.alarms.verdict import Verdict, Word, direction, judge, wind
+from groundstation.service.alarms.verdict import Verdict as HoleVerdict
+from groundstation.service.alarms.verdict import Word, direction, judge, wind
 from groundstation.service.alarms.verdict_doubts import known_of
+from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.rounding import rounded, rounded_std
+from groundstation.service.answers.rounding import round_to_std, rounded_std
+from groundstation.service.answers.shapes.column_shapes import Off, Steer, Verdict
+from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.survey.wall.column_deviation import Deviation
 
-View = dict[str, Any]
 CM = 100.0
 FINEST_CM = 0.1  # cm, of a line for a screen
 PHRASES = {
@@ -23,53 +25,54 @@ PHRASES = {
 }
 
 
-def verdict(k: RigModel, _p: dict[str, str]) -> View:
+@view_of(Verdict)
+def answer_verdict(k: RigModel, _p: Parameters) -> Verdict:
     """The verdict of this moment."""
-    known = known_of(k)
+    rig, good_for, known = k.config.rig, k.config.stale_after, known_of(k)
     found = judge(known)
-    way = None if found.about is None or found.act_before is None else steer(found.about, found)
-    return {
-        "rig": k.config.rig,
-        "good_for_s": k.config.stale_after,
-        "verdict": found.word.value,
-        "by_surveys": found.by_surveys.value,
-        "line": line(found),
-        "todo": todo(found.word, way),
-        "why": list(found.why),
-        "doubts": [doubt.value for doubt in found.doubts],
-        "bit_md_m": known.bit,
-        "target_m": known.target,
-        "what": found.what or None,
-        "off": None if found.about is None else off(found.about),
-        "steer": way,
-    }
+    way = None if found.about is None or found.act_before is None else steering_view(found.about, found)
+    return Verdict(
+        rig=rig,
+        good_for_s=good_for,
+        verdict=found.word.value,
+        by_surveys=found.by_surveys.value,
+        line=verdict_line(found),
+        todo=todo_line(found.word, way),
+        why=list(found.why),
+        doubts=[doubt.value for doubt in found.doubts],
+        bit_md_m=known.bit,
+        target_m=known.target,
+        what=found.what or None,
+        off=None if found.about is None else off_target_view(found.about),
+        steer=way,
+    )
 
 
-def off(d: Deviation) -> View:
+def off_target_view(d: Deviation) -> Off:
     """How far off, where, and in which direction."""
-    return {
-        "md_m": round(d.md, 2),
-        "deviation_cm": rounded(CM * d.size, CM * d.std),
-        "sigma_cm": rounded_std(CM * d.std),
-        "limit_cm": round(CM * d.limit, 1),
-        "used_percent": round(100.0 * d.ratio) if math.isfinite(d.ratio) else None,
-        "azimuth_deg": round(math.degrees(direction(d))) % 360,
-        "wind": wind(direction(d)),
-    }
+    return Off(
+        md_m=round(d.md, 2),
+        deviation_cm=round_to_std(CM * d.size, CM * d.std),
+        sigma_cm=rounded_std(CM * d.std),
+        limit_cm=round(CM * d.limit, 1),
+        used_percent=round(100.0 * d.ratio) if math.isfinite(d.ratio) else None,
+        azimuth_deg=round(math.degrees(direction(d))) % 360,
+        wind=wind(direction(d)),
+    )
 
 
-def steer(d: Deviation, found: Verdict) -> View:
+def steering_view(d: Deviation, found: HoleVerdict) -> Steer:
     """Where to, and until when."""
     back = direction(d) + math.pi
-    return {
-        "azimuth_deg": round(math.degrees(back)) % 360,
-        "wind": wind(back),
-        "before_md_m": None if found.act_before is None else round(found.act_before, 1),
-        "left_m": None if found.left is None else round(found.left, 1),
-    }
+    return Steer(
+        azimuth_deg=round(math.degrees(back)) % 360,
+        wind=wind(back),
+        before_md_m=None if found.act_before is None else round(found.act_before, 1),
+        left_m=None if found.left is None else round(found.left, 1),
+    )
 
 
-def line(found: Verdict) -> str:
+def verdict_line(found: HoleVerdict) -> str:
     """The verdict as one line for a screen."""
     phrase, d = PHRASES[found.word], found.about
     if found.word is Word.DONT_KNOW:
@@ -77,7 +80,7 @@ def line(found: Verdict) -> str:
     if d is None:
         return phrase
     spread = max(rounded_std(CM * d.std), FINEST_CM)
-    size = rounded(CM * d.size, spread) if spread >= 1.0 else CM * d.size  # rounded once, as it is written
+    size = round_to_std(CM * d.size, spread) if spread >= 1.0 else CM * d.size  # rounded once, as it is written
     is_end = found.what == "projection"
     where = "ends" if is_end else f"at {d.md:.1f} m"
     said = f"{phrase}: {where} {size:.1f} ± {spread:.1f} cm at {round(math.degrees(direction(d))) % 360} deg"
@@ -87,18 +90,18 @@ def line(found: Verdict) -> str:
     return f"{said}; act " + (f"before {found.act_before:.1f} m" if found.left > 0.0 else "at once")
 
 
-def todo(word: Word, way: View | None) -> str:
+def todo_line(word: Word, way: Steer | None) -> str:
     """What to do, in a line for a screen."""
     match word:
         case Word.ON_TARGET:
             return "go on"
         case Word.WATCH | Word.STEER if way is not None:
             verb = "steer" if word is Word.STEER else "if it grows, steer"
-            where = f"{verb} to {way['azimuth_deg']:g} deg {way['wind']}"
-            if way["left_m"] is not None and way["left_m"] <= 0.0:
+            where = f"{verb} to {way.azimuth_deg:g} deg {way.wind}"
+            if way.left_m is not None and way.left_m <= 0.0:
                 return f"{where} at once"
-            left = "" if way["left_m"] is None else f", {way['left_m']:.1f} m are left"
-            return f"{where} before {way['before_md_m']:.1f} m{left}"
+            left = "" if way.left_m is None else f", {way.left_m:.1f} m are left"
+            return f"{where} before {way.before_md_m:.1f} m{left}"
         case Word.WATCH | Word.STEER:
             return "go on, and look at the next survey"
         case Word.OUT:

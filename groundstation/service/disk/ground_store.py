@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import sqlalchemy as sa
@@ -153,7 +153,7 @@ class Store(Database):
         if doubt.trusted is not None:
             values["depth_trusted"] = _numbers(*doubt.trusted)
         if doubt.times:
-            values["depth_doubted"] = "; ".join(_numbers(*astuple(stand)) for stand in doubt.times)
+            values["depth_doubted"] = "; ".join(map(_stand_text, doubt.times))
         with self._writing() as connection:
             self._replace_meta(connection, values, without=["depth_trusted", "depth_doubted"])
 
@@ -262,6 +262,10 @@ class Store(Database):
 
 def _numbers(*values: float) -> str:
     return " ".join(map(repr, values))
+
+
+def _stand_text(stand: Stand) -> str:
+    return _numbers(stand.epoch, stand.begun_at, stand.ended_at, stand.md)
 
 
 def _reading_of(text: str) -> tuple[int, float, float]:

@@ -7,7 +7,6 @@ import secrets
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 from groundstation.config import GroundConfig
@@ -27,6 +26,7 @@ from groundstation.service.string.stands import take_stand
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seal_watch import SealWatch, refusal_of
 from telemetry.errors import DecodeError
+from telemetry.frozen import replace
 from telemetry.messages import (
     BASE,
     EPOCH_UNKNOWN,

@@ -15,7 +15,6 @@ import msgpack
 
 from groundstation.errors import GroundError
 from telemetry.errors import DecodeError
-from telemetry.frozen import quickly_made
 from telemetry.messages import Message
 from telemetry.presentation.msgpack_codec import decode, encode
 
@@ -30,7 +29,6 @@ class IntakeError(GroundError, ValueError):
     """The bytes are no event of an intake."""
 
 
-@quickly_made
 @dataclass(frozen=True, slots=True)
 class Intake:
     """One event: its number from 1, s of the own clock, rig time (s, NaN before it is known) and its epoch."""

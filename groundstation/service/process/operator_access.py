@@ -17,8 +17,7 @@ from typing import Any
 from groundstation.config import GroundConfig
 from groundstation.errors import ConfigurationError, SelectorError
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.paths import find
-from groundstation.service.answers.views import View
+from groundstation.service.answers.paths import find_path
 from groundstation.service.disk.ground_store import Store
 from groundstation.service.orders.blocks import block_of_files
 from groundstation.service.orders.order_book import Order, OrderState
@@ -87,7 +86,7 @@ class Operator:
         )  # and obeyed
         self.changed: Callable[[list[str]], None] = lambda _paths: None  # called with the paths that changed
 
-    def ask(self, path: str, parameters: Mapping[str, str] | None = None) -> View:
+    def ask(self, path: str, parameters: Mapping[str, str] | None = None) -> dict[str, Any]:
         """Answer of the path below ``ground/``, see docs/keys.md.
 
         Raises
@@ -95,7 +94,7 @@ class Operator:
         SelectorError
             When there is no such path, or a parameter cannot be; it lists what can.
         """
-        return find(self._model, path).show(self._model, dict(parameters or {}))
+        return find_path(self._model, path).show(self._model, dict(parameters or {}))
 
     def ask_json(self, path: str) -> bytes:
         """Answer of the path as JSON.
@@ -105,7 +104,7 @@ class Operator:
         SelectorError
             When there is no such path.
         """
-        return find(self._model, path).json(self._model, {})
+        return find_path(self._model, path).json(self._model, {})
 
     def order(self, name: str, parameters: Mapping[str, str], by: str = "operator") -> Order:
         """Accept an order as an operator writes it.
@@ -223,7 +222,7 @@ class Operator:
         self._accepted_at = {o.number: self._accepted_at.get(o.number, now) for o in self._waiting()}
         self.publish_orders()
 
-    def reply_of(self, order: Order) -> View:
+    def reply_of(self, order: Order) -> dict[str, Any]:
         """Answer to the sender of an order: the order, or how far the calibration in the field has come."""
         is_recalibration = order.spec.name == "recalibrate"
         return self.ask("recalibration" if is_recalibration else f"orders/{order.number}")

@@ -12,8 +12,9 @@ import math
 from array import array
 from bisect import bisect_left, bisect_right, insort
 from collections import Counter, deque
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
+from telemetry.frozen import replace
 from telemetry.messages import EPOCH_UNKNOWN, DepthReading, Stand
 
 LIMIT = 100_000  # readings kept of an epoch, those at rest in a stand count as two

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from groundstation.service.string.depth import DepthLog
 from groundstation.service.string.stops import Stops, belongs
+from telemetry.frozen import replace
 from telemetry.messages import Stand
 
 FIRST_EPOCH = 1  # of rig time: an encoder that has never started before

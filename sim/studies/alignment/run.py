@@ -22,7 +22,7 @@ from node.firmware.alignment_orders import METHODS, angles_of
 from node.firmware.tube_settings import Kernel
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import default_config
-from sim.rig.direct_string import DirectString
+from sim.string.direct_string import DirectString
 from sim.studies.pool import Step, over_cores, seed_jobs
 from sim.studies.scenarios import Tables, complete_string
 from sim.studies.trials import bootstrap_interval, interval_row

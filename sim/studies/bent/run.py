@@ -30,7 +30,8 @@ from groundstation.survey.fusion.transport import carry_directions
 from groundstation.survey.well.ellipsoid import coverage_radius
 from groundstation.survey.well.trajectory import Trajectory, TrajectoryPoint
 from node.kernels.arithmetic.angles import wrap_angle
-from sim.rig.direct_string import DirectString, Survey
+from sim.string.direct_string import DirectString
+from sim.string.result import StringSurvey
 from sim.studies.pool import Step, over_cores, seed_jobs
 from sim.studies.scenarios import CALIBRATED, Tables, change_sections
 from sim.world.scenario import scenario_of
@@ -99,7 +100,7 @@ def run_seed(job: tuple[Tables, int]) -> BentRun:
     return trajectory_errors(world, DirectString(world).drill().surveys)
 
 
-def trajectory_errors(world: World, surveys: Sequence[Survey]) -> BentRun:
+def trajectory_errors(world: World, surveys: Sequence[StringSurvey]) -> BentRun:
     """Errors of a ground station's trajectory of all surveys, by what it was told of the string."""
     hole = world.scenario.hole
     shared = SharedErrors()
@@ -121,7 +122,7 @@ def trajectory_errors(world: World, surveys: Sequence[Survey]) -> BentRun:
     return found
 
 
-def fused_stations(world: World, surveys: Sequence[Survey], shared: SharedErrors) -> dict[float, Direction]:
+def fused_stations(world: World, surveys: Sequence[StringSurvey], shared: SharedErrors) -> dict[float, Direction]:
     """Direction of every station as its tubes measured it, by measured depth (m) from the collar down."""
     file = world.scenario.file
     mount_var = math.radians(file.joints.mount_std_deg) ** 2

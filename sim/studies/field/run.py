@@ -18,7 +18,8 @@ import numpy.typing as npt
 from groundstation.survey.fusion.resolve import angle_stds, direction_angles, known_direction, resolve_direction
 from groundstation.survey.fusion.transport import carry_directions
 from node.kernels.arithmetic.angles import wrap_angle
-from sim.rig.direct_string import DirectString, StringRun
+from sim.string.direct_string import DirectString
+from sim.string.result import StringRun
 from sim.studies.field.cases import ALL, BLOCKS, CASES, DisturbanceCase
 from sim.studies.pool import Step, over_cores, seed_jobs
 from sim.studies.scenarios import Tables

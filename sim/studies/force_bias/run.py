@@ -19,7 +19,8 @@ from groundstation.survey.fusion.force_biases import ForceBias, Look, look_of, s
 from groundstation.survey.fusion.resolve import angle_stds, direction_angles, resolve_direction
 from groundstation.survey.fusion.shared import SharedErrors
 from node.kernels.arithmetic.angles import wrap_angle
-from sim.rig.direct_string import DirectString, Survey
+from sim.string.direct_string import DirectString
+from sim.string.result import StringSurvey
 from sim.studies.pool import Step, over_cores, seed_jobs
 from sim.studies.scenarios import Tables
 from sim.world.scenario import scenario_of
@@ -84,7 +85,7 @@ def run_seed(job: tuple[Tables, int]) -> BiasRun:
     return judge_biases(world, DirectString(world).drill().surveys)
 
 
-def judge_biases(world: World, surveys: Sequence[Survey]) -> BiasRun:
+def judge_biases(world: World, surveys: Sequence[StringSurvey]) -> BiasRun:
     """Biases stop by stop, each with what was known after the one before."""
     found = BiasRun([], [], [], [], [], [])
     looks = looks_of(world, surveys)
@@ -122,7 +123,7 @@ def azimuth_std(look: Look, bias_cov: Array) -> float:
     return angle_stds(look.lean, 1.0, cov)[1]
 
 
-def looks_of(world: World, surveys: Sequence[Survey]) -> list[tuple[int, Look]]:
+def looks_of(world: World, surveys: Sequence[StringSurvey]) -> list[tuple[int, Look]]:
     """Every survey below the collar as a look, with the number of its stop."""
     file = world.scenario.file
     shared = SharedErrors()

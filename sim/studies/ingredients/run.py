@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sim.rig.plain_encoder import LINES
+from sim.string.plain_encoder import LINES
 from sim.studies.lab import LAB, REST, ROTATING
 from sim.studies.pool import Step
 from sim.studies.published_form.published_forms import DELAY_MS, FORMS, run_published, setup_of

@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from node.kernels.record.filter_record import UNKNOWN_YAW_VAR
 from node.kernels.record.node_record import A_RATE, A_SEQUENCE, A_VALID, A_YAW_VAR
-from sim.rig.direct_string import aiding_passes
-from sim.rig.encoder_course import measured_of
+from sim.string.head_measurements import measure_head
+from sim.string.schedule import aiding_passes
 from sim.world.world import World
 
 Array = npt.NDArray[np.float64]
@@ -72,7 +72,7 @@ def model_of(world: World, hops: int) -> Model:
 
 def node_timeline(world: World) -> NodeTimeline:
     """Cycles of a world that is plain, and the aidings of which nothing is lost."""
-    measured, ends = measured_of(world), world.ends
+    measured, ends = measure_head(world), world.ends
     heard = aiding_passes(world.scenario.file.aiding, ends - world.begin, world.seed)
     used = np.flatnonzero(heard)
     _, first = np.unique(measured[used, A_SEQUENCE], return_index=True)  # a repetition is the same measurement

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sim.rig.direct_string import DirectString, StringRun, Survey
+from sim.string.direct_string import DirectString
+from sim.string.result import StringRun, StringSurvey
 from sim.studies.epochs import BLOCKS, RESTING
 from sim.studies.limits.bound import Bound, bound_of, model_of, node_timeline
 from sim.studies.pool import Step, over_cores, seed_jobs
@@ -117,7 +118,7 @@ def compare_with_bound(world: World, run: StringRun, bound: Bound) -> LimitRun:
     return LimitRun(errors, stated, best)
 
 
-def last_word(run: StringRun, first: Survey, ends: Array, before: float) -> Survey:
+def last_word(run: StringRun, first: StringSurvey, ends: Array, before: float) -> StringSurvey:
     """Last revision of a survey that was sent before rig time ``before`` (s)."""
     again = [one for one in run.revisions if (one.cycle, one.tube) == (first.cycle, first.tube)]
     return next((one for one in reversed(again) if ends[one.said] < before), first)

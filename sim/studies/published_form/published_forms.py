@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from node.firmware.kernel_choice import added_loop
-from sim.rig.plain_encoder import LINES
+from sim.string.plain_encoder import LINES
 from sim.studies.lab import REST, LabRun, run_seed
 from sim.studies.published_form.published_step import published_loop
 from sim.studies.scenarios import Tables, change_sections

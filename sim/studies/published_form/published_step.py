@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from node.firmware.kernel_choice import Loop
 from node.kernels.arithmetic.formats import Array
-from node.kernels.arithmetic.jit import kernel
+from node.kernels.arithmetic.jit import entry_kernel, kernel
 from node.kernels.record.node_record import END, JOINED, START
 from node.kernels.step.node_step import REFUSED, aiding_around, begin_step, conclude_cycle, say_events, take_status
 from node.kernels.turns.guard import judge_cycle
@@ -15,7 +15,7 @@ from node.kernels.turns.swings import follow_swing
 from sim.studies.published_form.feed_forward import offer_aiding, run_cycle
 
 
-@kernel
+@entry_kernel
 def published_step(nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
     """One cycle of one node as ``node.kernels.step.node_step.node_step``; returns what there is to say."""
     node = nodes[0]
@@ -37,7 +37,7 @@ def leave_published(nodes: Array, settings: Array, moment: Array, status: int, w
     return int(conclude_cycle(nodes, settings, moment))
 
 
-@kernel
+@entry_kernel
 def published_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
     """Take one aiding into a node as ``node.kernels.step.node_step.node_aiding``."""
     return int(aiding_around(offer_aiding, nodes, settings, aiding))

@@ -16,6 +16,7 @@ from groundstation.calibration.field_calibration import (
     inclination_rms,
     true_specific_forces,
 )
+from telemetry import frozen
 from telemetry.messages import Matrix3, StaticRecord
 
 G, DAY = 9.81, "2024-05-31"
@@ -90,7 +91,7 @@ def test_a_calibration_says_where_it_comes_from_and_is_the_same_for_the_same_rec
 
 def spoil(place: int, **changes: object) -> list[Rest]:
     made = rests()
-    made[place] = replace(made[place], record=replace(made[place].record, **changes))
+    made[place] = replace(made[place], record=frozen.replace(made[place].record, **changes))
     return made
 
 

@@ -21,9 +21,6 @@ from groundstation.service.orders.recalibration.recalibration_progress import (
     Progress,
     Stage,
     TubeProgress,
-    View,
-    attitude_view,
-    tube_view,
 )
 from groundstation.service.orders.recalibration.solution import Proposal, propose, propose_bias
 from groundstation.survey.fusion.force_biases import SurveyedBiases
@@ -264,15 +261,9 @@ class FieldProcedure:
             tube.phase, tube.detail = Phase.REFUSED, f"upload {status.phase.name.lower()}: {status.detail}"
             self._end_if_all_ended()
 
-    def view(self) -> View:
-        """What the operator sees."""
-        p = self.progress
-        return {
-            "state": p.stage.value,
-            "proposal": p.proposal,
-            "attitudes": [attitude_view(attitude, number) for number, attitude in enumerate(p.attitudes, 1)],
-            "tubes": [tube_view(tube, len(self._rests(tube)), self._before(tube)) for tube in p.tubes.values()],
-        }
+    def count_records(self, tube: TubeProgress) -> int:
+        """Records of a tube at rest so far, the newest of each attitude."""
+        return len(self._rests(tube))
 
     def _next_request(self, tube: TubeProgress) -> Request | None:
         p = self.progress
@@ -302,7 +293,7 @@ class FieldProcedure:
         return [Rest(attitudes[k].pitch, attitudes[k].roll, r) for k, r in sorted(self._good(tube).items())]
 
     def _propose(self, tube: TubeProgress, made: Callable[[TubeProgress, ParameterBlock], Proposal]) -> None:
-        before = self._before(tube)
+        before = self.block_before(tube)
         if before is None:
             raise CalibrationError(
                 f"block in use: expected one that this ground station has sent, got {tube.hash_before or 'no answer'}"
@@ -311,7 +302,7 @@ class FieldProcedure:
         tube.proposed, tube.found, tube.calibration = found.block.canonical().hex(), found.found, found.calibration
         tube.phase, tube.detail = Phase.PROPOSED, ""
 
-    def _before(self, tube: TubeProgress) -> ParameterBlock | None:
+    def block_before(self, tube: TubeProgress) -> ParameterBlock | None:
         """Block that the tube used at the beginning, if it is known here."""
         identity = ParameterBlock(tube.tube, 0)
         return identity if tube.hash_before == identity.sha256().hex() else self.blocks.get(tube.hash_before)

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import enum
 import json
-import math
 from dataclasses import asdict, dataclass, field
-from typing import Any
 
 from telemetry.messages import Vector3
-from telemetry.parameters import ParameterBlock, SensorParameters, unpack_block
-
-View = dict[str, Any]
+from telemetry.parameters import ParameterBlock, unpack_block
 
 
 class Stage(enum.StrEnum):
@@ -111,59 +107,6 @@ class Progress:
             tubes[int(name)] = TubeProgress(**row | {"phase": Phase(row["phase"]), "orders": orders, "found": found})
         attitudes = [Attitude(**row) for row in whole["attitudes"]]
         return cls(Stage(whole["stage"]), attitudes, tubes, whole["proposal"], whole.get("mixed", []))
-
-
-def attitude_view(attitude: Attitude, number: int) -> View:
-    """One attitude, ``number`` from 1."""
-    return {
-        "attitude": number,
-        "pitch_deg": round(math.degrees(attitude.pitch), 9),
-        "roll_deg": round(math.degrees(attitude.roll), 9),
-        "told_at_s": attitude.at,
-        "left_at_s": attitude.left,
-    }
-
-
-def tube_view(tube: TubeProgress, records: int, before: ParameterBlock | None) -> View:
-    """One tube; ``records`` at rest so far, ``before`` the block it had if it is known."""
-    block, found = tube.block, tube.found
-    row: View = {
-        "tube": tube.tube,
-        "phase": tube.phase.value,
-        "detail": tube.detail,
-        "records": records,
-        "asked": len(tube.orders),
-        "version_before": tube.version_before,
-        "hash_before": tube.hash_before,
-        "accelerometer_before": None if before is None else sensor_view(before.accelerometer),
-        "version": None if block is None else block.version,
-        "hash_proposed": "" if block is None else block.sha256().hex(),
-        "accelerometer": None if block is None else sensor_view(block.accelerometer),
-        "uploads": tube.uploads,
-        "restarted": tube.restarted,
-        "hash_after_restart": tube.hash_after_restart,
-        "hash": tube.hash,
-    }
-    return row | {"solution": None if found is None else found_view(found)}
-
-
-def found_view(found: Found) -> View:
-    """Figures of a solution."""
-    return {
-        "residual_rms_mps2": found.residual_rms,
-        "bias_std_mps2": list(found.bias_std),
-        "matrix_std": found.matrix_std,
-        "condition": found.condition,
-        "inclination_rms_deg": {
-            "before": math.degrees(found.inclination_before),
-            "after": math.degrees(found.inclination_after),
-        },
-    }
-
-
-def sensor_view(sensor: SensorParameters) -> View:
-    """Matrix and bias at the reference temperature."""
-    return {"matrix": [list(row) for row in sensor.matrix], "bias_mps2": list(sensor.bias)}
 
 
 IDLE = Progress()

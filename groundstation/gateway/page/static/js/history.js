@@ -5,17 +5,24 @@ import { byId, shape, write } from "./dom.js";
 const [NARROWEST, HEIGHT, LEFT, EDGE] = [240, 90, 34, 6];
 const FULLEST = 120; // percent, at least
 
+/** @typedef {import("./answers").HistoryMoment} HistoryMoment */
+
 /** The slider of the history; `show` takes the column of a moment, or null for the present one. */
 export class History {
   constructor(show) {
+    /** @type {HistoryMoment[]} */
     this.moments = [];
     this.show = show;
-    this.chosen = null; // a moment, or null for the present
+    /** @type {HistoryMoment | null} the moment that is shown, or null for the present */
+    this.chosen = null;
     byId("moment").addEventListener("input", () => this.choose(Number(byId("moment").value)));
     byId("live").addEventListener("click", () => this.choose(this.moments.length));
   }
 
-  /** Take the moments; what was chosen stays chosen. */
+  /**
+   * Take the moments; what was chosen stays chosen.
+   * @param {HistoryMoment[]} moments
+   */
   take(moments) {
     this.moments = moments;
     const slider = byId("moment");

@@ -6,7 +6,17 @@ const FEWEST_ORDERS = 8;
 const DONE = { sent: "sent …", acknowledged: "under way …", done: "done", failed: "FAILED" };
 const SIGNS = { bad: "▲", degraded: "●", notice: "○" };
 
-/** A row a tube from the top down: grey while nothing is wrong. */
+/** @typedef {import("./answers").WallNeighbourhood} WallNeighbourhood */
+/** @typedef {import("./answers").AlarmsAnswer} AlarmsAnswer */
+/** @typedef {import("./answers").Alarm} Alarm */
+/** @typedef {import("./answers").OrdersAnswer} OrdersAnswer */
+/** @typedef {import("./picture.js").Picture} Picture */
+
+/**
+ * A row a tube from the top down: grey while nothing is wrong.
+ * @param {Picture} picture
+ * @param {number} sinceHeard seconds
+ */
 export function showString(picture, sinceHeard) {
   const tubes = picture.tubes();
   byId("string").classList.toggle("linkless", tubes.every((row) => margins(row).length === 0));
@@ -20,7 +30,10 @@ export function showString(picture, sinceHeard) {
   });
 }
 
-/** The joints with the neighbours, the worst first. */
+/**
+ * The joints with the neighbours, the worst first.
+ * @param {WallNeighbourhood | null} [wall]
+ */
 export function showWall(wall) {
   byId("wall").hidden = !wall;
   if (!wall) return;
@@ -37,7 +50,10 @@ export function showWall(wall) {
   });
 }
 
-/** Open alarms, the worst first, each with what may be done about it; `act` takes the action and the alarm. */
+/**
+ * Open alarms, the worst first, each with what may be done about it; `act` takes the action and the alarm.
+ * @param {AlarmsAnswer} [alarms]
+ */
 export function showAlarms(alarms, act) {
   const open = alarms?.open ?? [];
   write(byId("alarms-title"), `Alarms ${open.length}`);
@@ -45,6 +61,7 @@ export function showAlarms(alarms, act) {
   fillList(byId("alarm-list"), open, (alarm) => alarm.number, (alarm) => alarmItem(alarm, act), fillAlarm);
 }
 
+/** @param {Alarm} alarm */
 function alarmItem(alarm, act) {
   const named = (name, text) => {
     const button = element("button", { type: "button", class: name, "aria-label": `${text} alarm ${alarm.number}` }, text);
@@ -56,6 +73,7 @@ function alarmItem(alarm, act) {
   return element("li", {}, text, element("div", { class: "buttons" }, ...buttons));
 }
 
+/** @param {Alarm} alarm */
 function fillAlarm(item, alarm) {
   const active = alarm.state === "raised" || alarm.state === "latched";
   item.className = `${alarm.level} ${active ? "active" : ""}`;
@@ -72,7 +90,10 @@ function fillAlarm(item, alarm) {
   item.querySelector(".unshelve").hidden = alarm.state !== "shelved";
 }
 
-/** The newest orders of anybody, the newest first, and what became of them. */
+/**
+ * The newest orders of anybody, the newest first, and what became of them.
+ * @param {OrdersAnswer} [orders]
+ */
 export function showOrders(orders) {
   const newest = (orders?.orders ?? []).slice(-FEWEST_ORDERS).reverse();
   fillList(byId("orders"), newest, (order) => order.order, () => element("li", {}, element("span"), element("span", { class: "by" })), (item, order) => {
@@ -86,7 +107,10 @@ export function showOrders(orders) {
   });
 }
 
-/** The tubes that may be told to survey, the lowest chosen until the user chooses another. */
+/**
+ * The tubes that may be told to survey, the lowest chosen until the user chooses another.
+ * @param {Picture} picture
+ */
 export function showTubes(picture) {
   const tubes = (picture.answers.string?.tubes ?? []).map((row) => String(row.tube)).reverse();
   const select = byId("tube");

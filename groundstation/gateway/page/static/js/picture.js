@@ -7,6 +7,11 @@ const FRESH_WITHOUT_WORD_S = 4.5;
 const DELAYS_KEPT = 60;
 const KEEP_OUT = "do not drill on by this screen until the cause is mended";
 
+/** @typedef {import("./answers").Answers} Answers */
+/** @typedef {import("./answers").Verdict} Verdict */
+/** @typedef {import("./answers").StringTube} StringTube */
+/** @typedef {import("./answers").NodeAnswer} NodeAnswer */
+
 export class Picture {
   constructor() {
     this.forget();
@@ -14,12 +19,18 @@ export class Picture {
 
   /** Begin anew: another ground station, or another start of it. */
   forget() {
+    /** @type {Partial<Answers>} the newest of each path */
     this.answers = {};
     this.verdictAt = null;
     this.delays = [];
   }
 
-  /** Take an answer; an older one than is known changes nothing. */
+  /**
+   * Take an answer; an older one than is known changes nothing.
+   * @template {keyof Answers} Path
+   * @param {Path} path
+   * @param {Answers[Path]} answer
+   */
   onAnswer(path, answer, at) {
     const known = this.answers[path];
     if (known && answer.revision < known.revision && answer.utc < known.utc) return;
@@ -49,7 +60,10 @@ export class Picture {
     return this.age(now) <= (this.answers.verdict?.good_for_s ?? FRESH_WITHOUT_WORD_S);
   }
 
-  /** The verdict, or DON'T KNOW once it is too old to count on. */
+  /**
+   * The verdict, or DON'T KNOW once it is too old to count on.
+   * @returns {Partial<Verdict>}
+   */
   verdict(now) {
     const found = this.answers.verdict;
     if (found && this.isLive(now)) return found;
@@ -59,7 +73,10 @@ export class Picture {
     return { ...(found ?? { by_surveys: "dont_know" }), verdict: "dont_know", line: `DON'T KNOW: ${silent}`, why: [silent], todo: KEEP_OUT };
   }
 
-  /** State of each tube from the top down. */
+  /**
+   * State of each tube from the top down.
+   * @returns {(StringTube & Partial<NodeAnswer>)[]}
+   */
   tubes() {
     const string = this.answers.string;
     return (string?.tubes ?? []).map((row) => {

@@ -6,7 +6,16 @@ const REACH = 118; // of the drawing, from its middle to an edge
 const FURTHEST = 0.86; // part of it that is used
 const STEPS_CM = [1, 2, 5, 10, 20, 50, 100, 200, 500];
 
-/** Draw into `place` what is known of the column. */
+/** @typedef {import("./answers").ColumnAnswer} ColumnAnswer */
+/** @typedef {import("./answers").UncertaintyAnswer} UncertaintyAnswer */
+/** @typedef {import("./answers").PlanEllipse} PlanEllipse */
+
+/**
+ * Draw into `place` what is known of the column.
+ * @param {Element} place
+ * @param {ColumnAnswer} column
+ * @param {UncertaintyAnswer} [uncertainty]
+ */
 export function drawPlan(place, column, uncertainty) {
   const stations = column.stations;
   const end = column.projection;
@@ -36,6 +45,7 @@ export function drawPlan(place, column, uncertainty) {
   place.replaceChildren(shape("svg", { viewBox: box, role: "img", "aria-label": label }, ...parts));
 }
 
+/** @param {PlanEllipse} ellipse */
 function region(cx, cy, ellipse, scale) {
   const [rx, ry] = [ellipse.major_m, ellipse.minor_m].map((m) => Math.max(100 * m * scale, 0.5));
   const turn = `rotate(${ellipse.azimuth_deg - 90} ${cx} ${cy})`;

@@ -11,7 +11,16 @@ const TURN_PER_PX = 0.7; // degrees
 /** Where the viewer looks: towards an azimuth, and how far from above (degrees). */
 export const view = { azimuth: 30, elevation: 20 };
 
-/** Draw into `place` the column as it is seen from the view. */
+/** @typedef {import("./answers").ColumnAnswer} ColumnAnswer */
+/** @typedef {import("./answers").ColumnDeviation} ColumnDeviation */
+/** @typedef {import("./answers").UncertaintyAnswer} UncertaintyAnswer */
+
+/**
+ * Draw into `place` the column as it is seen from the view.
+ * @param {Element} place
+ * @param {ColumnAnswer} column
+ * @param {UncertaintyAnswer} [uncertainty]
+ */
 export function drawSpace(place, column, uncertainty) {
   const stations = column.stations;
   const end = column.projection;
@@ -65,12 +74,19 @@ function around(point) {
   return Array.from({ length: RING }, (_, k) => point(Math.cos((k * 360 * RAD) / RING), Math.sin((k * 360 * RAD) / RING))).join(" ");
 }
 
-/** At most `count` of the rows, evenly, with the last among them. */
+/**
+ * At most `count` of the rows, evenly, with the last among them.
+ * @param {ColumnDeviation[]} rows
+ */
 function spread(rows, count) {
   const step = Math.max(Math.ceil(rows.length / count), 1);
   return rows.filter((_, k) => (rows.length - 1 - k) % step === 0);
 }
 
+/**
+ * @param {ColumnDeviation[]} stations
+ * @param {UncertaintyAnswer} [uncertainty]
+ */
 function regions(stations, uncertainty, seen) {
   const found = new Map((uncertainty?.stations ?? []).map((s) => [s.md_m, s.plan_ellipse]));
   return spread(stations.filter((r) => found.has(r.md_m) && r.md_m > 0), REGIONS).map((r) => {

@@ -7,7 +7,15 @@ const [LEFT, RIGHT, TOP, LOW] = [34, 12, 22, 18]; // margins
 const NAME = 50; // room for the name of the axis
 const TICKS = [1, 2, 5, 10, 20, 50, 100, 200];
 
-/** Draw into `place` the deviation at every station and at the target. */
+/** @typedef {import("./answers").ColumnAnswer} ColumnAnswer */
+/** @typedef {import("./answers").ColumnDeviation} ColumnDeviation */
+
+/**
+ * Draw into `place` the deviation at every station and at the target.
+ * @param {Element} place
+ * @param {ColumnAnswer} column
+ * @param {number | null} [bit] its measured depth
+ */
 export function drawStrip(place, column, bit) {
   const end = column.projection;
   const rows = end ? [...column.stations, end] : column.stations;
@@ -36,6 +44,7 @@ export function drawStrip(place, column, bit) {
   place.replaceChildren(shape("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": label }, ...parts));
 }
 
+/** @param {ColumnDeviation} deep */
 function fan(deep, x, y) {
   const names = [[0.5, "50"], [0.8, "80"], [1, "100 %"]];
   return names.map(([part, name]) =>

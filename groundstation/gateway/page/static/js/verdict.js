@@ -4,7 +4,12 @@ import { byId, shown, write } from "./dom.js";
 
 const WORDS = { on_target: "ON TARGET", watch: "WATCH", steer: "STEER", out: "OUT", dont_know: "DON'T KNOW" };
 
-/** Show the verdict of this moment; that of a replay has no colour, lest it be taken for the present one. */
+/** @typedef {import("./picture.js").Picture} Picture */
+
+/**
+ * Show the verdict of this moment; that of a replay has no colour, lest it be taken for the present one.
+ * @param {Picture} picture
+ */
 export function showVerdict(picture, now, { replay }) {
   const found = (replay && picture.answers.verdict) || picture.verdict(now);
   const section = byId("verdict");
@@ -19,7 +24,10 @@ export function showVerdict(picture, now, { replay }) {
   document.title = `${word} ${picture.answers.status?.rig ?? ""}`;
 }
 
-/** Show which hole, how fresh, how deep, what stands. */
+/**
+ * Show which hole, how fresh, how deep, what stands.
+ * @param {Picture} picture
+ */
 export function showFacts(picture, now, { hole, rig, replay }) {
   const { status, verdict, alarms } = picture.answers;
   const live = Boolean(replay) || picture.isLive(now);

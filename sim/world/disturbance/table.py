@@ -1,0 +1,55 @@
+"""The table of disturbances, in the order in which they act.
+
+A new one is a module beside these with its ``Disturbance``, and one line here. What it is called, which keys of a
+scenario it owns and what a campaign makes of it stand in its row alone.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from sim.world.disturbance.accelerometer import FORCE_BIAS, FORCE_NOISE
+from sim.world.disturbance.asymmetry import ASYMMETRY
+from sim.world.disturbance.bias_step import BIAS_STEP
+from sim.world.disturbance.converter import CLIPPED_FORCES, CLIPPED_RATES, RANGE, STEPS
+from sim.world.disturbance.drift import DRIFT
+from sim.world.disturbance.earth_rate import EARTH_RATE
+from sim.world.disturbance.eighths import EIGHTHS
+from sim.world.disturbance.fifo import FRAMES, JITTER
+from sim.world.disturbance.force_pull import PULL_ACROSS, PULL_ALONG
+from sim.world.disturbance.gyroscope import GYROSCOPE
+from sim.world.disturbance.low_pass import LOW_PASS
+from sim.world.disturbance.mount_tilt import MOUNT_TILT
+from sim.world.disturbance.row import Disturbance
+from sim.world.disturbance.vibration import RECTIFICATION, TORSIONAL, VIBRATION
+from sim.world.disturbance.wander import WANDER
+from sim.world.disturbance.warm_up import WARM_UP
+from sim.world.disturbance.white_noise import SINGLE_SAMPLES, WHITE_NOISE
+
+TABLE: Final[tuple[Disturbance, ...]] = (
+    TORSIONAL,
+    EARTH_RATE,
+    MOUNT_TILT,
+    VIBRATION,
+    RECTIFICATION,
+    PULL_ACROSS,
+    ASYMMETRY,
+    CLIPPED_RATES,
+    CLIPPED_FORCES,
+    LOW_PASS,
+    FRAMES,
+    JITTER,
+    SINGLE_SAMPLES,
+    BIAS_STEP,
+    WARM_UP,
+    DRIFT,
+    GYROSCOPE,
+    WANDER,
+    WHITE_NOISE,
+    PULL_ALONG,
+    STEPS,
+    RANGE,
+    EIGHTHS,
+    FORCE_BIAS,
+    FORCE_NOISE,
+)
