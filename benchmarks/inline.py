@@ -25,10 +25,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from borechain.cli.rig.rig_command import RigJob, drill_in_processes, process_table, settings_of, world_of
-from borechain.inline import InlineRig
+from borechain.drilling.drill_hole import read_world
+from borechain.drilling.inline import InlineRig
+from borechain.drilling.rig_host import opened_router
+from borechain.drilling.rig_job import RigJob
+from borechain.drilling.rig_processes import drill_in_processes, process_table, settings_of
 from borechain.load.hour import scenario_text
-from borechain.rig_host import opened_router
 from sim.rig.in_process import InProcessStepper, carry_unwritten
 from sim.rig.launcher import Tick
 from sim.rig.processes import ProcessTable
@@ -187,7 +189,7 @@ def drilled_inline(scenario: Path, folder: Path) -> tuple[Meter, Counting]:
     """Drill with objects in this process."""
     folder.mkdir()
     job = RigJob(scenario, 1, math.inf)
-    world = world_of(job)
+    world = read_world(job)
     rig = InlineRig(world, settings_of(world, job), job.rig_name, folder)
     rig.stepper = counting = Counting(rig.stepper.builders, carry=carry_unwritten)
     meter = Meter(time.process_time)
@@ -200,7 +202,7 @@ def drilled_by_processes(scenario: Path, folder: Path) -> tuple[Meter, dict[str,
     """Drill with a process a tube; memory of each (MB), what is shared by those who share it."""
     folder.mkdir()
     job = RigJob(scenario, 1, math.inf, endpoint=free_endpoint())
-    world = world_of(job)
+    world = read_world(job)
     tables: list[ProcessTable] = []
     memory: dict[str, float] = {}
 

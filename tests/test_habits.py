@@ -1,17 +1,26 @@
 """Habits: every target is explained, every result has its caption, hook and check run what they claim to run."""
 
+import ast
+import inspect
 import re
 import subprocess
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from textwrap import dedent
+from typing import Any
 
+import click
 import pytest
 import yaml
 
+from borechain.__main__ import cli
+from node.process.command_group import commands
 from sim.studies.study_table import STUDIES
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "docs" / "results"
 DECISIONS = ROOT / "docs" / "decisions"
+MOST_PARAMETERS, MOST_LINES = 10, 40  # of the function of a command
 
 
 def targets() -> dict[str, str]:
@@ -158,6 +167,31 @@ def test_every_link_of_a_document_leads_somewhere(page: Path) -> None:
         if not there.exists() or (anchor and anchor not in anchors(there)):
             lost.append(target)
     assert lost == []
+
+
+def callbacks(command: click.Command, context: click.Context) -> Iterator[Callable[..., Any]]:
+    """Functions of a command and of all below it, without what decorates them."""
+    if command.callback is not None:
+        yield inspect.unwrap(command.callback)
+    if isinstance(command, click.Group):
+        for name in command.list_commands(context):
+            found = command.get_command(context, name)
+            assert found is not None
+            yield from callbacks(found, click.Context(found, parent=context, info_name=name))
+
+
+def test_a_command_is_options_one_call_and_print() -> None:
+    functions = {f for group in (cli, commands) for f in callbacks(group, click.Context(group))}
+    assert len(functions) > 40
+    large = []
+    for function in functions:
+        (node,) = ast.parse(dedent(inspect.getsource(function))).body
+        assert isinstance(node, ast.FunctionDef)
+        lines = (node.end_lineno or node.lineno) - node.lineno + 1
+        taken = len(inspect.signature(function).parameters)
+        if lines > MOST_LINES or taken > MOST_PARAMETERS:
+            large.append(f"{function.__module__}.{function.__name__}: {taken} parameters, {lines} lines")
+    assert large == []
 
 
 ODD = re.compile(

@@ -11,7 +11,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from groundstation.service.process.ground_process import GroundProcess
 from node.process.tube_process import TubeProcess
 from sim.gauntlet.fault import EVERYBODY, Step

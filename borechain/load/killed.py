@@ -22,7 +22,7 @@ from telemetry.messages import ENCODER
 from telemetry.runtime.hosting import Place
 
 RIG = "killed"
-PRELOAD = "borechain.preload"
+PRELOAD = "borechain.drilling.preload"
 AT_ONCE = 8  # events that wait for their receipt
 MOST_RECEIPTS = 40  # of a life
 PATIENCE_S = 60.0

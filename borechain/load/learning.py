@@ -19,9 +19,9 @@ import numpy as np
 
 from borechain.load.crowd import ROUND_S, TUBE_LENGTH, state_of
 from borechain.load.day import ADVANCE, ADVANCES, BEGUN_AT, EPOCH, depth_of, surveys_at, up_to, write_day
-from borechain.recording.ground_replay import TapeClock
 from groundstation.config import GroundConfig, checked_config
 from groundstation.ground_host import start_ground_process
+from groundstation.recording.ground_replay import TapeClock
 from sim.errors import RigError
 from telemetry.application.depth_source import DepthSource
 from telemetry.frozen import replace

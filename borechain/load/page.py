@@ -60,7 +60,7 @@ def measure_load(load: Load, endpoint: str, page: PageSettings, folder: Path) ->
     settings = {"tube_length": TUBE_LENGTH, "target": TUBE_LENGTH * load.tubes + SPARE_M}
     serve = partial(run_ground, own_clock=True, page=page)
     specs = {GROUND: Spec(serve, (Place(RIG, endpoint, folder / "ground"), settings))}
-    table = ProcessTable(specs, ["borechain.preload"])
+    table = ProcessTable(specs, ["borechain.drilling.preload"])
     try:
         table.warm()
         with open_router(endpoint) as bus:

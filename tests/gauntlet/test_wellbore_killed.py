@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from borechain.cli.rig.ground_settings import ground_settings
 from borechain.gauntlet.gauntlet_rig import GauntletRig
 from borechain.gauntlet.oracles import Observer
 from sim.gauntlet.fault import Step
 from sim.gauntlet.faulty_disk import FaultyDisk
 from sim.gauntlet.faulty_world import FaultyWorld
+from sim.rig.ground_settings import ground_settings
 from sim.world.random_streams import random_stream
 from sim.world.scenario import load_scenario
 from sim.world.shipped import find_scenario

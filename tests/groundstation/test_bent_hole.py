@@ -12,10 +12,10 @@ import pytest
 from schemas import check_answers, shown_on
 from test_model import survey
 
-from borechain.cli.rig.ground_settings import ground_settings
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from groundstation.config import GroundConfig
 from groundstation.service.answers.model import RigModel
+from sim.rig.ground_settings import ground_settings
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 from telemetry.messages import SurveyMeasurement

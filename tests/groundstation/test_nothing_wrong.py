@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from groundstation.service.process.ground_process import GroundProcess
 from node.process.counter import LOTS
 from node.process.tube_process import TubeProcess

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from rigs import REPOSITORY, free_endpoint, running_rig
 
-from borechain.cli.rig.ground_settings import ground_settings
-from borechain.cli.rig.rig_result import result_of
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from borechain.pki.rig_keys import add_tube, init_rig, rotate_keys
+from sim.rig.ground_settings import ground_settings
+from sim.rig.rig_result import rig_result
 from sim.rig.scheduler import RigProgress
 from sim.world.scenario import load_scenario
 from sim.world.world import World
@@ -65,7 +65,7 @@ def test_keys_change_in_the_middle_of_a_hole_and_forgers_come_and_no_survey_is_l
     rig = InlineRig(world, ground_settings(world), "rig-1", tmp_path, keys=keys)
     try:
         rig.run(change)
-        result = result_of({path: rig.ask(path) for path in ("stations", "measurements", "column", "alarms")}, world)
+        result = rig_result({path: rig.ask(path) for path in ("stations", "measurements", "column", "alarms")}, world)
         stored = [one.message for one in rig.ground.store.messages()]
         processes = rig.stepper.processes
         newest = {a: processes[a].endpoint.seals.ring.newest for a in (BASE, ENCODER, 1, 2, 3)}  # type: ignore[union-attr]

@@ -18,13 +18,13 @@ from schemas import check_answers
 from tapes import INTAKE, KEY, shown, write
 
 from borechain.cli.ground.record_command import replay as replay_command
-from borechain.cli.rig.ground_settings import ground_settings
-from borechain.inline import InlineRig
-from borechain.recording.ground_replay import replay_file
-from borechain.recording.recording_file import NAME, RecordedSample, Recording, RecordingError, RecordingWriter
+from borechain.drilling.inline import InlineRig
+from groundstation.recording.ground_replay import replay_file
+from groundstation.recording.recording_file import NAME, RecordedSample, Recording, RecordingError, RecordingWriter
 from groundstation.service.answers.answer_table import schemas_by_path
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import IntakeError, pack_intake, unpack_intake
+from sim.rig.ground_settings import ground_settings
 from sim.rig.scheduler import RigProgress
 from sim.world.scenario import load_scenario, scenario_of
 from sim.world.world import World

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from borechain.cli.rig.rig_command import PRELOAD
+from borechain.drilling.rig_processes import PRELOAD
 from node.firmware.tube_settings import KERNELS
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Scheme
@@ -135,7 +135,7 @@ def test_every_kernel_can_be_chosen_and_is_warmed_before_the_first_fork() -> Non
     assert [NodeSection(kernel=kernel).kernel for kernel in KERNELS] == list(KERNELS)
     assert set(PRELOAD) == set(KERNELS)
     program = (
-        "import borechain.preload_all\n"
+        "import borechain.drilling.preload_all\n"
         "from node.kernels.step import node_step as step\n"
         "from node.kernels.step import fixed_step as fixed\n"
         "steps = (step.node_step, fixed.fixed_step)\n"

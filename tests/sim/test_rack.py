@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from groundstation.calibration.attitudes import true_vectors
 from node.kernels.arithmetic.formats import PERIOD
 from sim.errors import ScenarioError

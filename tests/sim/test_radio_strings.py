@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from borechain.cli.rig.ground_settings import ground_settings
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from node.process.tube_process import TubeProcess
+from sim.rig.ground_settings import ground_settings
 from sim.rig.scheduler import RigProgress
 from sim.studies.soil_link.wet_clay import expected_delivery, largest_difference, surveys_of, wet_clay
 from sim.world.marks import wrap_angle

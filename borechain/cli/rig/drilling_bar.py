@@ -11,10 +11,10 @@ if TYPE_CHECKING:
     from sim.world.world import World
 
 
-class progress:  # noqa: N801
-    """Progress bar on stderr, silent for scripts."""
+class DrillingBar:
+    """Progress bar on stderr."""
 
-    def __init__(self, world: World, *, quiet: bool) -> None:
+    def __init__(self, world: World) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -24,7 +24,6 @@ class progress:  # noqa: N801
             TextColumn("{task.completed:.0f}/{task.total:.0f} s of rig time"),
             TimeRemainingColumn(),
             console=Console(stderr=True),
-            disable=quiet,
         )
         self._task = self._bar.add_task("starting", total=world.end - world.begin)
 

@@ -1,75 +1,13 @@
-"""What came of a run: as its ground station answers, as the JSON object of the command, and for people."""
+"""What came of a run, for people."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from borechain.cli.console_tables import table_console
-
-if TYPE_CHECKING:
-    from sim.world.world import World
-    from telemetry.media.zenoh_bus import ZenohBus
-
-NAMED = 5  # surveys named that are missing
-ASKED = ("stations", "measurements", "column", "alarms", "recalibration", "wall")
-
-
-def ask_surveys(bus: ZenohBus, rig_name: str) -> dict[str, Any]:
-    """Stations, trajectory and measurements as any operator would get them."""
-    return {path: get_json(bus, selector_of(rig_name, path)) for path in ASKED}
-
-
-def selector_of(rig_name: str, path: str, parameters: Mapping[str, str] | None = None) -> str:
-    """Selector of an answer of the ground station."""
-    asked = ";".join(f"{name}={value}" for name, value in (parameters or {}).items())
-    return f"borechain/{rig_name}/ground/{path}" + (f"?{asked}" if asked else "")
-
-
-def get_json(bus: ZenohBus, selector: str) -> Any:
-    """One reply of the ground station."""
-    from sim.errors import RigError
-
-    replies = bus.get(selector, timeout=10.0)
-    if len(replies) != 1 or replies[0].error is not None:
-        raise RigError(f"{selector}: expected one answer of the ground station, got {len(replies)}")
-    return json.loads(replies[0].payload)
-
-
-def result_of(answers: dict[str, Any], world: World) -> dict[str, Any]:
-    """The JSON object of the command."""
-    from sim.rig.calibration_report import calibration_result
-    from sim.rig.report import figures_of_merit, missing_surveys, station_digest, station_table
-
-    stations = station_table(answers["stations"]["stations"], world)
-    measurements = answers["measurements"]["measurements"]
-    result: dict[str, Any] = {
-        "stations": stations,
-        "figures": figures_of_merit(stations, measurements, world),
-        "measurements": len(measurements),
-        "column": {key: answers["column"][key] for key in ("worst", "projection", "dominant")},
-        "missing": missing_surveys(measurements, world),
-        "alarms": answers["alarms"]["active"],
-        "rig_alarms": answers["alarms"]["rig"],
-        "rig_s": round(world.end - world.begin, 3),
-        "digest": station_digest(stations),
-    }
-    if "wall" in answers:
-        result["wall"] = answers["wall"]["wall"]
-    if world.rack is not None:
-        result["calibration"] = calibration_result(answers["recalibration"], measurements, world)
-    return result
-
-
-def missing_surveys_line(missing: list[dict[str, Any]], measured: int, folder: Path) -> str:
-    """Line about surveys that the stops of a run asked for and that were not taken."""
-    named = ", ".join(f"tube {row['tube']} at {row['bit_md_m']:g} m of the bit" for row in missing[:NAMED])
-    more = f" and {len(missing) - NAMED} more" if len(missing) > NAMED else ""
-    return f"expected {measured + len(missing)} surveys, {len(missing)} are missing: {named}{more}; files in {folder}"
 
 
 def show_result(result: dict[str, Any], folder: Path) -> None:

@@ -1,17 +1,16 @@
-"""What ``borechain survey`` answers: rows of stations, regions of uncertainty in both axes, sources."""
+"""Rows of a survey's answer: stations with their regions of uncertainty in both axes, and sources."""
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from groundstation.survey.well.analysis import Analysis
-    from groundstation.survey.well.reference_frames import ReferenceFrame
+import numpy as np
 
-FRAME = ("north", "depth_reference", "height_datum")  # of every row of a table
+from groundstation.survey.well.analysis import Analysis
+from groundstation.survey.well.ellipsoid import hole_axes, plan_ellipse
+from groundstation.survey.well.methods import station_tangents
+from groundstation.survey.well.trajectory import TrajectoryPoint, interpolate_point
 
 
 def station_rows(
@@ -48,8 +47,6 @@ def station_rows(
 
 def uncertainty_region(cov: Any, sigma: float) -> dict[str, Any]:
     """Region of uncertainty: half-widths at ``sigma`` standard deviations, and the covariance (1 sigma)."""
-    from groundstation.survey.well.ellipsoid import plan_ellipse
-
     ellipse = plan_ellipse(cov, sigma)
     half = [sigma * math.sqrt(max(float(cov[i, i]), 0.0)) for i in range(3)]
     return {
@@ -65,8 +62,6 @@ def uncertainty_region(cov: Any, sigma: float) -> dict[str, Any]:
 
 def highside_region(cov: Any, sigma: float, inclination: float, azimuth: float) -> dict[str, Any]:
     """The same in the axes of the hole: highside, to the right of it, along."""
-    from groundstation.survey.well.ellipsoid import hole_axes
-
     axes = hole_axes(inclination, azimuth)
     turned = axes @ cov @ axes.T
     names = ("highside_m", "lateral_m", "along_m")
@@ -74,13 +69,8 @@ def highside_region(cov: Any, sigma: float, inclination: float, azimuth: float) 
     return half | {"covariance_hla_m2": turned.tolist()}
 
 
-def at_depth(found: Analysis, md: float, sigma: float) -> dict[str, Any]:
+def station_at_depth(found: Analysis, md: float, sigma: float) -> dict[str, Any]:
     """Position on the arc and its uncertainty at any depth."""
-    import numpy as np
-
-    from groundstation.survey.well.methods import station_tangents
-    from groundstation.survey.well.trajectory import TrajectoryPoint, interpolate_point
-
     directions = station_tangents(found.record.inclination, found.azimuth)
     none, no_columns = np.zeros((3, 3)), np.zeros((3, 0))
     points = [
@@ -100,36 +90,3 @@ def source_rows(found: Analysis, sigma: float) -> list[dict[str, Any]]:
         north, east, tvd = (sigma * math.sqrt(max(float(cov[-1, i, i]), 0.0)) for i in range(3))
         rows.append({"source": name, "north_m": north, "east_m": east, "tvd_m": tvd})
     return sorted(rows, key=lambda row: -math.hypot(row["north_m"], row["east_m"], row["tvd_m"]))
-
-
-def source_text(found: Analysis) -> str:
-    """Covariance of every source at every station, a .csv file as the industry's workbooks print it."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    axes = ("nn", "ee", "vv", "ne", "nv", "ev")
-    writer.writerow(["md_m", "source", *(f"{name}_m2" for name in axes), *FRAME])
-    places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    parts, named = found.uncertainty.by_source(), frame_words(found.frame)
-    for k, md in enumerate(found.md.tolist()):
-        for name, cov in parts.items():
-            writer.writerow([md, name, *(float(cov[(k, *place)]) for place in places), *named])
-    return text.getvalue()
-
-
-def frame_words(frame: ReferenceFrame) -> list[str]:
-    """North, depth reference and height datum, as every row of a table names them."""
-    return [frame.answer, frame.depths.answer, frame.height_datum]
-
-
-def table_text(rows: list[dict[str, Any]], frame: ReferenceFrame) -> str:
-    """Station table, a .csv file; every row names its frame."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    plain = [key for key in rows[0] if key != "uncertainty"]
-    half = ("north_m", "east_m", "tvd_m")
-    writer.writerow([*plain, *(f"uncertainty_{key}" for key in half), *FRAME])
-    named = frame_words(frame)
-    writer.writerows(
-        [[*(row[key] for key in plain), *(row["uncertainty"][key] for key in half), *named] for row in rows]
-    )
-    return text.getvalue()

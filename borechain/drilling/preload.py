@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 
-import borechain.rig_host
+import borechain.drilling.rig_host
 import groundstation.ground_host
 import node.process.node_host
 import sim.rig.bus_stepper

@@ -6,10 +6,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from borechain.recording.recording_file import Recording, RecordingError
 from groundstation.config import checked_config
 from groundstation.errors import GroundError
+from groundstation.recording.recording_file import Recording, RecordingError
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import BEGIN, DEPTH, MESSAGE, ORDER, Intake, IntakeError, unpack_intake
 from telemetry import keys
@@ -123,3 +124,21 @@ def repeat_order(ground: GroundProcess, event: Intake) -> None:
             ground.operator.order(name, parameters, by)
     except (GroundError, BorechainError):
         return
+
+
+def replay_summary(recording: Recording, folder: Path) -> dict[str, Any]:
+    """What a new ground station in ``folder`` knows after a recording; errors as ``open_replay``."""
+    done = replay_file(recording, folder)
+    ask = done.ground.operator.ask
+    try:
+        return {
+            "rig": recording.rig,
+            "whole": recording.whole,
+            "events": done.events,
+            "missing": done.missing,
+            "stations": ask("stations")["stations"],
+            "verdict": ask("verdict"),
+            "alarms": ask("alarms")["open"],
+        }
+    finally:
+        done.ground.close()

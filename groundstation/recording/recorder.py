@@ -11,7 +11,7 @@ from pathlib import Path
 
 import msgpack
 
-from borechain.recording.recording_file import RecordedSample, RecordingWriter
+from groundstation.recording.recording_file import RecordedSample, RecordingWriter
 from groundstation.service.answers.answer_table import schemas_by_path
 from groundstation.service.process.intake_tape import BEGIN, IntakeError, unpack_intake
 from telemetry import keys

@@ -6,7 +6,7 @@ saves.
 
 from __future__ import annotations
 
-from borechain import preload
+from borechain.drilling import preload
 from node.firmware.kernel_choice import kernel_of
 from node.firmware.tube_settings import KERNELS
 from node.kernels.step.precompile import warm_step

@@ -13,8 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from borechain.rare_collection import rare_collection
-from borechain.rig_host import depth_sealer
+from borechain.drilling.rare_collection import rare_collection
+from borechain.drilling.rig_host import depth_sealer
 from groundstation.config import GroundConfig
 from groundstation.service.process.ground_process import GroundProcess
 from node.process.encoder_process import EncoderProcess

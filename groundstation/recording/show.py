@@ -7,10 +7,10 @@ import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from borechain.recording.ground_replay import Replayed, open_replay
-from borechain.recording.recording_file import Recording
 from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.ground_host import page_of
+from groundstation.recording.ground_replay import Replayed, open_replay
+from groundstation.recording.recording_file import Recording
 from groundstation.service.process.intake_tape import Intake
 from telemetry.runtime.event_loop import run_event_loop, stop_on_signals
 
