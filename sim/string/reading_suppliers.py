@@ -16,7 +16,7 @@ from node.kernels.sensors.correction import USUAL
 from sim.kernel import shared_body
 from sim.string.hops import cross_hop, record_hops
 from sim.world.disturbance.lanes import CLOCK, draw_further, draw_numbers
-from sim.world.disturbance.reading import DRAWN, LOSS, read_frames, read_sensors
+from sim.world.disturbance.sensor_reading import DRAWN, LOSS, read_frames, read_sensors
 from sim.world.motion import Motion
 from sim.world.scenario import Scenario
 from sim.world.truth import TubeTruth

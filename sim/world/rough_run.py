@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.world.borehole import Borehole
-from sim.world.disturbance.reading import move_tube
 from sim.world.disturbance.row import OneImu, TubeMotion
+from sim.world.disturbance.sensor_reading import move_tube
 from sim.world.motion import Motion
 from sim.world.rough_disc import RoughDisc
 from sim.world.rough_motion import RoughMotion

@@ -14,8 +14,8 @@ from sim.world.disturbance.bias_step import stepped_bias
 from sim.world.disturbance.drift import Drift, draw_drift
 from sim.world.disturbance.gyroscope import draw_gyroscope
 from sim.world.disturbance.mount_tilt import draw_tilt
-from sim.world.disturbance.reading import Cycles, read_eighths, read_grid, read_means
 from sim.world.disturbance.row import ImuSamples, OneImu
+from sim.world.disturbance.sensor_reading import Cycles, read_eighths, read_grid, read_means
 from sim.world.disturbance.wander import wandering_bias
 from sim.world.drill_string import DrillString
 from sim.world.random_streams import RandomStream, random_stream

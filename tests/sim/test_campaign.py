@@ -26,8 +26,8 @@ from sim.campaign.summary import OverRuns, Sum, honesty_rows
 from sim.errors import RigError, ScenarioError
 from sim.string.direct_string import DirectString
 from sim.string.drawn_string import frames_of
-from sim.world.disturbance.reading import DRAWN, read_sensors
 from sim.world.disturbance.records import make_shared, make_tubes
+from sim.world.disturbance.sensor_reading import DRAWN, read_sensors
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
 

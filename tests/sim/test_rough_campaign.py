@@ -27,9 +27,9 @@ from sim.world.disturbance.frame_layout import FINER
 from sim.world.disturbance.frame_sums import FrameField
 from sim.world.disturbance.frame_vibration import Vibration
 from sim.world.disturbance.low_pass import low_passed
-from sim.world.disturbance.reading import DRAWN, read_frames
 from sim.world.disturbance.records import make_shared, make_tubes
 from sim.world.disturbance.row import OneImu
+from sim.world.disturbance.sensor_reading import DRAWN, read_frames
 from sim.world.disturbance.vibration import band_noise
 from sim.world.disturbance.white_noise import add_part_noise
 from sim.world.scenario import Scenario, load_scenario, scenario_of

@@ -9,8 +9,8 @@ import pytest
 from node.kernels.arithmetic.formats import PERIOD
 from sim.errors import ScenarioError
 from sim.world.disturbance.converter import clip_rates, quantise_rates
-from sim.world.disturbance.reading import read_means
 from sim.world.disturbance.row import ImuSamples, OneImu
+from sim.world.disturbance.sensor_reading import read_means
 from sim.world.disturbance.wander import gauss_markov
 from sim.world.marks import wrap_angle
 from sim.world.scenario import load_scenario

@@ -13,7 +13,7 @@ import click
 from borechain.cli.faults import EnvironmentFault, InputFault, plain_faults, require_modules
 from borechain.cli.notices import print_notice
 from borechain.cli.rig.drilling_bar import DrillingBar
-from borechain.cli.rig.rig_result import show_result
+from borechain.cli.rig.shown_result import show_result
 from borechain.cli.shared_options import fault_option, json_option, scenario_argument, seed_option, speed_option
 from borechain.crew.log import RunLog
 from borechain.drilling.rig_job import RigJob, RigWatcher, no_progress

@@ -15,10 +15,10 @@ from groundstation.calibration.allan_analysis import (
     filter_noise_of,
 )
 from groundstation.calibration.calibration_records import read_static
-from groundstation.calibration.errors import CalibrationError
 from groundstation.report.calibration_sheets import allan_sheet
 from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome, naming_file
 from groundstation.report.calibrations.calibration_request import AllanRequest
+from telemetry.errors import CalibrationError
 
 
 def answer_allan(request: AllanRequest, day: str) -> CalibrationOutcome:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.report.sheet import Sheet
+from telemetry.errors import CalibrationError
 
 if TYPE_CHECKING:  # figures need an extra package, and are drawn when asked for
     from groundstation.report.figure_panels import Panel

@@ -13,7 +13,6 @@ from groundstation.calibration.attitudes import AttitudeFit, fit_attitudes, fit_
 from groundstation.calibration.block import Calibration, Provenance, to_json
 from groundstation.calibration.calibration_records import read_attitudes, read_turn_table
 from groundstation.calibration.coverage import COVERAGE
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.matrix_files import read_matrix
 from groundstation.calibration.temperature import Array
 from groundstation.calibration.turntable import SETTINGS, as_observations, correct_readings, turntable_alignment
@@ -26,6 +25,7 @@ from groundstation.report.calibrations.calibration_request import (
     TurntableRequest,
     jig_of,
 )
+from telemetry.errors import CalibrationError
 
 NOMINAL_C = 25.0  # of a block without temperature terms, which no reading depends on
 

@@ -7,7 +7,6 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.mwd_files import read_mwd
 from groundstation.calibration.mwd_model import nominal_triad, tool_readings
 from groundstation.calibration.mwd_record import ACCELEROMETER_VOLTS_PER_G, MAGNETOMETER_VOLTS_PER_MICROTESLA
@@ -21,6 +20,7 @@ from groundstation.report.calibrations.triad_files import (
     calibration_label,
     read_triad_file,
 )
+from telemetry.errors import CalibrationError
 
 
 def answer_quality(request: QualityRequest, day: str) -> CalibrationOutcome:

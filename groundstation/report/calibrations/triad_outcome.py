@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.jig import Jig
 from groundstation.calibration.mwd_block import of_fit, to_json
 from groundstation.calibration.mwd_files import MwdRecord, read_mwd
@@ -31,6 +30,7 @@ from groundstation.report.calibrations.triad_files import (
     calibration_label,
     read_triad_file,
 )
+from telemetry.errors import CalibrationError
 
 
 def answer_mwd(request: MwdRequest, day: str) -> CalibrationOutcome:

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.calibration.block import from_json, write_calibration
-from groundstation.calibration.errors import CalibrationError
 from groundstation.errors import SelectorError
 from groundstation.service.disk.ground_store import Store
 from groundstation.service.orders.recalibration.procedure import FieldProcedure
 from groundstation.service.orders.recalibration.recalibration_progress import RecalibrationProgress
 from groundstation.survey.fusion.force_biases import SurveyedBiases
+from telemetry.errors import CalibrationError
 
 
 class Recalibration:

@@ -12,7 +12,6 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.field_calibration import Rest
 from groundstation.errors import SelectorError
 from groundstation.service.orders.recalibration.recalibration_progress import (
@@ -24,6 +23,7 @@ from groundstation.service.orders.recalibration.recalibration_progress import (
 )
 from groundstation.service.orders.recalibration.solution import Proposal, propose_bias, propose_block
 from groundstation.survey.fusion.force_biases import SurveyedBiases
+from telemetry.errors import CalibrationError
 from telemetry.messages import BlockStatus, NodeState, Reply, Scalar, StaticRecord, UploadPhase
 from telemetry.parameters import SHORT_HASH, ParameterBlock
 
