@@ -211,7 +211,6 @@ EXCUSED = {  # file or folder: why the phrases stand there
     "CONTRIBUTING.md": "quotes one as the example of what not to write",
     "tests/test_habits.py": "lists them",
     "tests/tools/postgres.py": "the name of a user of the operating system",
-    "node/kernels": "a changed line there compiles every kernel anew; they go with the next change of the kernels",
 }
 
 
