@@ -20,9 +20,9 @@ LINE = """
     ),
 """
 METHOD = '''
-    def blink(self, arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+    def blink(self, arguments: Mapping[str, Any], _sequence: int) -> CommandOutcome:
         """Light the lamp."""
-        return Outcome(True, "blinking", {"times": arguments["times"]})
+        return CommandOutcome(True, "blinking", {"times": arguments["times"]})
 '''
 PROGRAM = """
 import json, sys

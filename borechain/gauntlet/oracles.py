@@ -211,7 +211,7 @@ def _directions(rig: GauntletRig) -> Iterator[str]:
 
 
 def _flags(hole: SurveyedHole) -> Iterator[str]:
-    """Flags have their effects: a faulty sensor's survey is not fused, and an unknown yaw gives no azimuth."""
+    """Violations of the flags' effects: a faulty sensor's survey is not fused, an unknown yaw gives no azimuth."""
     for station in hole.stations:
         for stop in station.stops:
             if NodeFlag.SENSOR_FAULT in stop.flags:

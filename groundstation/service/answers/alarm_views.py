@@ -19,7 +19,7 @@ from groundstation.service.answers.shapes.alarm_shapes import (
 )
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.hole.deviation_alarms import DeviationAlarm
-from groundstation.service.hole.surveyed_hole import Moved
+from groundstation.service.hole.movement import Moved
 from groundstation.survey.wall.column_deviation import LEVELS
 
 
