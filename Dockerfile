@@ -15,5 +15,5 @@ RUN python -m pip install --no-cache-dir --no-build-isolation --no-deps . \
 USER operator
 WORKDIR /home/operator
 # half a minute of compiling that no container then spends at its start
-RUN python -c "import borechain.preload_all"
+RUN python -c "import borechain.drilling.preload_all"
 ENTRYPOINT ["borechain"]

@@ -34,7 +34,7 @@ from sim.string.drill import drill_string, new_memory
 from sim.string.head_measurements import measure_head
 from sim.string.hops import draw_hops
 from sim.string.nodes import loop_of, new_nodes
-from sim.string.readings import DrawnReadings, draw_readings
+from sim.string.reading_suppliers import DrawnReadings, draw_readings
 from sim.string.schedule import StringSchedule, redraw_schedule
 from sim.studies.epochs import resting_string
 from sim.world.scenario import Scenario, load_scenario, scenario_of

@@ -24,7 +24,7 @@ from telemetry.media.media_table import open_medium
 from telemetry.media.port import STEPPER, Port, PortFrame, Priority, TubeEnd
 from telemetry.messages import Message, Side
 from telemetry.presentation.can_messages import NATIVE, NativeMessage
-from telemetry.presentation.msgpack_codec import encode, unwritten
+from telemetry.presentation.msgpack_codec import encode_message, unwritten_message
 from telemetry.schema import SPEC_OF
 from telemetry.transport.hop import Header, LinkFrame
 from telemetry.unwritten import Content
@@ -32,7 +32,7 @@ from telemetry.unwritten import Content
 EXCHANGES, ROUNDS = 1000, 15
 PAYLOADS, DECODED = 20, 2000
 PATIENCE, TURN, TRIES = 60.0, 1.0, 10  # s
-AIDING_BYTES = len(encode(AIDING))
+AIDING_BYTES = len(encode_message(AIDING))
 NATIVE_AIDING = NATIVE[SPEC_OF[type(AIDING)].kind]
 context = multiprocessing.get_context("fork")  # before any thread is started
 
@@ -165,7 +165,7 @@ def ends(name: str) -> tuple[TubeEnd, TubeEnd]:
 def frame_of(number: int, sender: int) -> PortFrame:
     """The aiding as the link hands it to its port."""
     header = Header(sender, HEADER.epoch, number, *HEADER[3:])
-    return PortFrame(LinkFrame(header, [(0, unwritten(AIDING))]), Priority.AIDING, "aiding")
+    return PortFrame(LinkFrame(header, [(0, unwritten_message(AIDING))]), Priority.AIDING, "aiding")
 
 
 @contextlib.contextmanager

@@ -19,23 +19,31 @@ import msgpack
 import numpy as np
 
 from borechain.load.rounds import compare_rounds
-from groundstation.survey import error_model
-from groundstation.survey.compiled_model import locate, warm
-from groundstation.survey.error_sources import Leg, Site, Survey
-from groundstation.survey.formulas import ARRAY, CONSTANTS, VARIABLES, compile_formulas, parse, plain
-from groundstation.survey.instruments import load_tool
-from groundstation.survey.methods import Method, positions
-from telemetry.messages import Aiding, Message, Mode, NodeFlag, NodeState
+from groundstation.survey.tools.formulas import (
+    ARRAY,
+    CONSTANTS,
+    VARIABLES,
+    compile_formulas,
+    normalise_name,
+    parse_formula,
+)
+from groundstation.survey.tools.instruments import load_tool
+from groundstation.survey.well.compiled_model import locate_stations, preload_models
+from groundstation.survey.well.error_propagation import propagate_errors
+from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
+from groundstation.survey.well.methods import Method, station_positions
+from telemetry.messages import Aiding, Message, NodeFlag, NodeMode, NodeState
 from telemetry.presentation.can_checks import CHECKS
 from telemetry.presentation.can_messages import NATIVE
 from telemetry.presentation.message_codec import CODECS
-from telemetry.presentation.msgpack_codec import decode, encode
-from telemetry.schema import SPEC_OF, Kind
+from telemetry.presentation.msgpack_codec import decode_message, encode_message
+from telemetry.schema import SPEC_OF, MessageKind
 
 LEAST = 2.0  # times as fast
 ROUNDS, SPELL = 15, 0.01  # s of one round
 STATE = NodeState(
-    7, 123.456, 3, Mode.TRACKING, 1.5, 1e-6, 2e-6, (1e-4, 2e-4, 3e-4), 1e-4, 0.01, 1e-7, 0.5, 1e-9, NodeFlag.RESTORED,
+    7, 123.456, 3, NodeMode.TRACKING, 1.5, 1e-6, 2e-6, (1e-4, 2e-4, 3e-4), 1e-4, 0.01, 1e-7, 0.5, 1e-9,
+    NodeFlag.RESTORED,
     12345, 2, 1, b"12345678", (0.01, 0.02, 0.003), 3, 55,
 )  # fmt: skip
 AIDING = Aiding(1.0, 1e-8, 0.0, 0.0, 0.1, 100.0, 7, 0, epoch=1)
@@ -59,12 +67,12 @@ def run() -> dict[str, Any]:
 
 def msgpack_pairs() -> dict[str, Pair]:
     """A node's state by msgspec, and by msgpack with the check of each field by hand."""
-    payload = encode(STATE)
+    payload = encode_message(STATE)
     if decode_by_hand(payload) != STATE or encode_by_hand(STATE) != payload:
         raise RuntimeError("expected both ways to say the same")
     return {
-        "msgpack decode": (lambda: decode(payload), lambda: decode_by_hand(payload)),
-        "msgpack encode": (lambda: encode(STATE), lambda: encode_by_hand(STATE)),
+        "msgpack decode": (lambda: decode_message(payload), lambda: decode_by_hand(payload)),
+        "msgpack encode": (lambda: encode_message(STATE), lambda: encode_by_hand(STATE)),
     }
 
 
@@ -101,7 +109,7 @@ def can_pairs() -> dict[str, Pair]:
     """An aiding and a node's state, each on classic CAN and on CAN FD, compiled and signal by signal."""
     cases = [
         (NATIVE[kind], CODECS[type(message)].values_of(message), fd)
-        for kind, message in ((Kind.AIDING, AIDING), (Kind.NODE_STATE, STATE))
+        for kind, message in ((MessageKind.AIDING, AIDING), (MessageKind.NODE_STATE, STATE))
         for fd in (False, True)
     ]
     frames = [native.pack(values, 5, fd=fd) for native, values, fd in cases]
@@ -137,16 +145,16 @@ def frozen_pair() -> Pair:
 def survey_pairs() -> dict[str, Pair]:
     """The error model of a long survey, compiled and by arrays; a tool's formulas as a function, and walked."""
     tool, site, method = load_tool("mwd-rev5.1"), Site(9.80665, 50_000.0, np.radians(72.0)), Method.MINIMUM_CURVATURE
-    warm(["mwd-rev5.1"])
+    preload_models(["mwd-rev5.1"])
     md, inclination, azimuth = (np.linspace(*ends, STATIONS) for ends in ((0.0, 5000.0), (0.01, 1.5), (0.2, 2.0)))
-    survey, legs, start = Survey(md, inclination, azimuth, md), [Leg(tool)], np.zeros(3)
+    survey, legs, start = WellSurvey(md, inclination, azimuth, md), [Leg(tool)], np.zeros(3)
 
     def located() -> Any:
-        return locate(method, survey, legs, site, start, slot_allowance=True)[1].cov
+        return locate_stations(method, survey, legs, site, start, slot_allowance=True)[1].cov
 
     def by_arrays() -> Any:
-        tvd = positions(method, md, inclination, azimuth)[:, 2]
-        return error_model.propagate(Survey(md, inclination, azimuth, tvd), legs, site, slot_allowance=True).cov
+        tvd = station_positions(method, md, inclination, azimuth)[:, 2]
+        return propagate_errors(WellSurvey(md, inclination, azimuth, tvd), legs, site, slot_allowance=True).cov
 
     np.testing.assert_allclose(located(), by_arrays(), rtol=1e-6, atol=1e-9)
     formulas = [text for term in tool.terms for text in term.formulas]
@@ -154,8 +162,8 @@ def survey_pairs() -> dict[str, Pair]:
     inputs = [*values, *tool.parameters.values()]
     np.seterr(invalid="ignore")  # a root of less than nothing costs both the same
     function = compile_formulas(formulas, tuple(tool.parameters))
-    known = {plain(name): value for name, value in zip([*VARIABLES, *tool.parameters], inputs, strict=True)}
-    trees = [parse(text) for text in formulas]
+    known = {normalise_name(name): value for name, value in zip([*VARIABLES, *tool.parameters], inputs, strict=True)}
+    trees = [parse_formula(text) for text in formulas]
 
     def walked_all() -> list[Any]:
         return [walked(tree, known) for tree in trees]
@@ -174,7 +182,7 @@ def walked(node: ast.expr, known: dict[str, Any]) -> Any:
         case ast.Constant():
             return node.value
         case ast.Name():
-            name = plain(node.id)
+            name = normalise_name(node.id)
             return known[name] if name in known else CONSTANTS[name]
         case ast.UnaryOp():
             return -walked(node.operand, known)
@@ -182,7 +190,11 @@ def walked(node: ast.expr, known: dict[str, Any]) -> Any:
             return OPERATORS[type(node.op)](walked(node.left, known), walked(node.right, known))
         case ast.Call(func=ast.Name() as func):
             given = [walked(one, known) for one in node.args]
-            return given[0] * given[0] if plain(func.id) == "sqr" else getattr(ARRAY, plain(func.id))(*given)
+            return (
+                given[0] * given[0]
+                if normalise_name(func.id) == "sqr"
+                else getattr(ARRAY, normalise_name(func.id))(*given)
+            )
     raise RuntimeError(f"expected a formula, got {ast.dump(node)}")
 
 

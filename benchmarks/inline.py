@@ -25,15 +25,17 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from borechain.cli.rig.rig_command import RigJob, drill_in_processes, process_table, settings_of, world_of
-from borechain.inline import InlineRig
+from borechain.drilling.drill_hole import read_world
+from borechain.drilling.inline import InlineRig
+from borechain.drilling.rig_host import opened_router
+from borechain.drilling.rig_job import RigJob
+from borechain.drilling.rig_processes import drill_in_processes, process_table, settings_of
 from borechain.load.hour import scenario_text
-from borechain.rig_host import opened_router
-from sim.rig.in_process import InProcessStepper, unwritten
+from sim.rig.in_process import InProcessStepper, carry_unwritten
 from sim.rig.launcher import Tick
 from sim.rig.processes import ProcessTable
-from sim.rig.realtime import cpu_seconds, footprint, pids
-from sim.rig.scheduler import Progress
+from sim.rig.realtime_run import cpu_seconds, memory_footprint, running_pids
+from sim.rig.scheduler import RigProgress
 from sim.rig.stepper import Answer, FrameEvent
 from telemetry.messages import BASE, ENCODER
 from telemetry.runtime.stepped import Due
@@ -116,7 +118,7 @@ class Meter:
         self.told = 0
         self.length = math.nan  # s of rig time
 
-    def follow(self, tick: Tick | Progress) -> None:
+    def follow(self, tick: Tick | RigProgress) -> None:
         """The rig has told how far it is."""
         self.told += 1
         self.length = tick.end - tick.begin
@@ -187,9 +189,9 @@ def drilled_inline(scenario: Path, folder: Path) -> tuple[Meter, Counting]:
     """Drill with objects in this process."""
     folder.mkdir()
     job = RigJob(scenario, 1, math.inf)
-    world = world_of(job)
+    world = read_world(job)
     rig = InlineRig(world, settings_of(world, job), job.rig_name, folder)
-    rig.stepper = counting = Counting(rig.stepper.builders, carry=unwritten)
+    rig.stepper = counting = Counting(rig.stepper.builders, carry=carry_unwritten)
     meter = Meter(time.process_time)
     rig.run(meter.follow)
     rig.close()
@@ -200,7 +202,7 @@ def drilled_by_processes(scenario: Path, folder: Path) -> tuple[Meter, dict[str,
     """Drill with a process a tube; memory of each (MB), what is shared by those who share it."""
     folder.mkdir()
     job = RigJob(scenario, 1, math.inf, endpoint=free_endpoint())
-    world = world_of(job)
+    world = read_world(job)
     tables: list[ProcessTable] = []
     memory: dict[str, float] = {}
 
@@ -209,10 +211,10 @@ def drilled_by_processes(scenario: Path, folder: Path) -> tuple[Meter, dict[str,
         return tables[0]
 
     def spent() -> float:
-        return time.process_time() + sum(cpu_seconds(pid) for pid in pids(tables[0]).values())
+        return time.process_time() + sum(cpu_seconds(pid) for pid in running_pids(tables[0]).values())
 
     def weigh() -> None:
-        memory.update({name: footprint(pid)["pss_mb"] for name, pid in pids(tables[0]).items()})
+        memory.update({name: memory_footprint(pid)["pss_mb"] for name, pid in running_pids(tables[0]).items()})
 
     meter = Meter(spent, weigh)
     with opened_router(job.endpoint) as bus:

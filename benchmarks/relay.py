@@ -19,15 +19,15 @@ from borechain.load.rounds import compare_rounds
 from node.kernels.step.precompile import warm_up
 from node.process.drivers.timed import TimedImu
 from node.process.node_host import run_node
-from sim.rig.realtime import clock_offset
-from sim.world.recording import record, turning_once
+from sim.rig.realtime_run import clock_offset
+from sim.world.recording import record_sensors, turning_once
 from sim.world.world import World
 from telemetry.application.endpoint import Endpoint
 from telemetry.media.port import Port, TubeEnd
 from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router, use_few_threads
 from telemetry.media.zenoh_port import CONNECT_TIMEOUT, ZenohMedium
 from telemetry.messages import ENCODER, Aiding, Side
-from telemetry.presentation.msgpack_codec import decode
+from telemetry.presentation.msgpack_codec import decode_message
 from telemetry.runtime.event_loop import run_event_loop as run_loop
 from telemetry.runtime.hosting import OwnTime, Place
 from telemetry.runtime.inbox import Inbox
@@ -58,7 +58,7 @@ def run() -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="borechain-") as place, contextlib.ExitStack() as stack:
         folder, endpoint = Path(place), free_endpoint()
         world = turning_once(TUBE, time.monotonic(), RECORDED, 1.0, 2.0 * RECORDED, 1, 0.0)
-        record(world, folder)
+        record_sensors(world, folder)
         stack.enter_context(running(relay_as_node, world, folder, endpoint))
         stack.enter_context(running(put_on, endpoint))
         stack.enter_context(running(put_on_by_loop, endpoint))
@@ -241,5 +241,5 @@ def sequences(frame: bytes) -> list[int]:
     parsed = parse_frame(frame)
     if parsed is None:
         raise RuntimeError("expected a frame of the link")
-    messages = [decode(content) for _, content in parsed[1]]
+    messages = [decode_message(content) for _, content in parsed[1]]
     return [message.sequence for message in messages if isinstance(message, Aiding)]

@@ -27,8 +27,8 @@ from telemetry.messages import (
     Event,
     ImuMean,
     Message,
-    Mode,
     NodeFlag,
+    NodeMode,
     NodeState,
     Receipt,
     Reply,
@@ -37,7 +37,7 @@ from telemetry.messages import (
     StaticRecord,
     SurveyMeasurement,
 )
-from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.presentation.msgpack_codec import decode_message, encode_message
 from telemetry.transport.hop import pack_frame, parse_frame
 from telemetry.transport.joint_seal import JointSeal
 from telemetry.transport.key_ring import key_file, read_ring
@@ -47,7 +47,7 @@ Z = (0.0, 0.0, 0.0)
 COV = ((1e-6, 0.0, 0.0), (0.0, 1e-6, 0.0), (0.0, 0.0, 1e-6))
 AIDING = Aiding(1.0, 1e-8, 0.0, 0.0, 0.1, 100.0, 7, 0, epoch=1)
 UP: tuple[Message, ...] = (
-    NodeState(1, 5.0, 2, Mode.TRACKING, 1.0, 1e-6, 1e-6, Z, 0.0, 0.0, 1e-7, 0.5, 1e-9, NodeFlag.NONE, 7, 0),
+    NodeState(1, 5.0, 2, NodeMode.TRACKING, 1.0, 1e-6, 1e-6, Z, 0.0, 0.0, 1e-7, 0.5, 1e-9, NodeFlag.NONE, 7, 0),
     SurveyMeasurement(1, 1, 5.0, 2, (ImuMean(Z, COV),), 1.0, 1e-6, 2e-6, 32, 18.5, NodeFlag.NONE),
     Event(1, 2, 5.0, Severity.INFO, "booted", {"yaw_deg": 1.0}),
     StaticRecord(1, 3, 1, 1.0, 2.0, 5, Z, COV, Z, COV, 20.0, False),
@@ -79,12 +79,12 @@ def measured(folder: Path) -> dict[str, dict[str, float]]:
     meet(base, tube)
     found = {}
     for message in UP:
-        payload, told = encode(message), tube.close_up(encode(message))
+        payload, told = encode_message(message), tube.close_up(encode_message(message))
         found[type(message).__name__] = both(
             lambda p=payload: tube.close_up(p), lambda t=told: base.hear(t, 1, 1.0), message
         )
     for message in DOWN:
-        payload, told = encode(message), base.close_down(encode(message), 1) or b""
+        payload, told = encode_message(message), base.close_down(encode_message(message), 1) or b""
         found[type(message).__name__] = both(
             lambda p=payload: base.close_down(p, 1), lambda t=told: tube.is_told(t, 1.0, is_offer=False), message
         )
@@ -94,7 +94,7 @@ def measured(folder: Path) -> dict[str, dict[str, float]]:
         lambda: encoder.close(AIDING), lambda: tube.measurement.admits(sealed, 1, 100.0), replace(AIDING)
     )
     source, depth = read_ring(key_file(folder, DEPTH_SOURCE), DEPTH_SOURCE), DepthReading(1, 1.0, 2.0, ())
-    payload = encode(depth)
+    payload = encode_message(depth)
     reading = seal_depth(source, payload)
     found["DepthReading"] = both(
         lambda: seal_depth(source, payload), lambda: open_depth(lambda: base.ring, reading), depth
@@ -113,10 +113,10 @@ def opened(folder: Path, address: int, sides: Any) -> Seals:
 
 def meet(base: Seals, tube: Seals) -> None:
     """Begin a session of a tube with the base."""
-    base.hear(tube.close_up(encode(UP[0])), 1, 0.0)
+    base.hear(tube.close_up(encode_message(UP[0])), 1, 0.0)
     for _, offer in base.due_offers():
         tube.is_told(offer, 0.0, is_offer=True)
-    if not base.hear(tube.close_up(encode(UP[0])), 1, 0.0).is_believed:
+    if not base.hear(tube.close_up(encode_message(UP[0])), 1, 0.0).is_believed:
         raise RuntimeError("expected a session")
 
 
@@ -152,14 +152,14 @@ def verify_times(folder: Path) -> dict[str, float]:
             message, payload = traffic.message, b""
             if isinstance(message, Aiding):
                 message = encoder.measurement.close(replace(message, sequence=number, valid_at=100.0, epoch=1))
-            payload = encode(message)
+            payload = encode_message(message)
             if isinstance(message, NodeState):
-                payload = tube.close_up(encode(replace(message, tube=1)))
+                payload = tube.close_up(encode_message(replace(message, tube=1)))
             frame = above.close(pack_frame(HEADER, [(0, payload)])) or b""
             begun = time.perf_counter()
             heard = verified(below.open(frame, 4.0) or b"", tube, base)
             times.append(time.perf_counter() - begun)
-            if heard != decode(content_of_sealed(payload)):
+            if heard != decode_message(content_of_sealed(payload)):
                 raise RuntimeError(f"expected {message}, got {heard}")
         found[type(traffic.message).__name__] = 1e6 * statistics.median(times)
     return found
@@ -172,8 +172,8 @@ def verified(frame: bytes, tube: Seals, base: Seals) -> Message | None:
         return None
     payload: bytes = parsed[1][0][1]
     if is_sealed(payload):
-        return decode(content_of_sealed(payload)) if base.hear(payload, 1, 4.0).is_believed else None
-    message = decode(payload)
+        return decode_message(content_of_sealed(payload)) if base.hear(payload, 1, 4.0).is_believed else None
+    message = decode_message(payload)
     is_believed = not isinstance(message, Aiding) or tube.measurement.admits(message, 1, 100.0)
     return message if is_believed else None
 
@@ -181,8 +181,8 @@ def verified(frame: bytes, tube: Seals, base: Seals) -> Message | None:
 def both(make: Callable[[], object], judge: Callable[[], object], message: Message) -> dict[str, float]:
     """Making and judging a seal beside encoding and decoding the message."""
     ours = best(make) + best(judge)
-    payload = encode(message)
-    peer = best(lambda: encode(message)) + best(lambda: decode(payload))
+    payload = encode_message(message)
+    peer = best(lambda: encode_message(message)) + best(lambda: decode_message(payload))
     return {"ours": ours, "peer": peer, "ratio": peer / ours}
 
 

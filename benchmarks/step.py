@@ -28,7 +28,7 @@ from node.kernels.record.sensor_record import PARAMETERS
 from sim.string.drill import drill_string, new_memory
 from sim.string.hops import HOP
 from sim.string.nodes import StringNodes, loop_of
-from sim.string.readings import RecordedReadings, record_readings
+from sim.string.reading_suppliers import RecordedReadings, record_readings
 from sim.string.schedule import StringSchedule
 from sim.studies.epochs import resting_string
 from sim.world.scenario import scenario_of

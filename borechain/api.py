@@ -7,6 +7,7 @@ radians inside the values; names with a unit (``md_m``, ``inclination_deg``) mea
 
 from __future__ import annotations
 
+import datetime
 import json
 import math
 import tempfile
@@ -18,7 +19,14 @@ from telemetry import keys
 from telemetry.errors import BorechainError, InputError, MediumError
 
 if TYPE_CHECKING:
+    from borechain.drilling.rig_job import DrilledRig, RigJob, RigWatcher
     from groundstation.calibration.attitudes import AttitudeFit
+    from groundstation.recording.recording_file import Recording
+    from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome
+    from groundstation.report.calibrations.calibration_request import CalibrationRequest
+    from groundstation.survey.requests.clearance_request import ClearanceRequest
+    from groundstation.survey.requests.survey_answer import SurveyAnswer
+    from groundstation.survey.requests.survey_request import SurveyRequest
     from groundstation.survey.wall.wall_file import Wall
     from groundstation.survey.wall.wall_joints import Joints
     from groundstation.survey.wall.wall_verdict import Judgement
@@ -30,11 +38,16 @@ __all__ = [
     "BorechainError",
     "InputError",
     "JudgedWall",
+    "answer_clearance",
+    "answer_survey",
+    "calibrate",
     "calibrate_attitudes",
     "calibrate_turntable",
     "drill",
+    "drill_rig",
     "load",
     "query",
+    "replay",
     "scenarios",
     "survey",
     "wall",
@@ -49,6 +62,19 @@ class JudgedWall:
     joints: Joints
     worst: tuple[int, int]
     judgement: Judgement
+
+    @property
+    def is_tight(self) -> bool:
+        """Whether the wall is proven to be tight."""
+        from groundstation.survey.wall.wall_verdict import WallVerdict
+
+        return self.judgement.verdict is WallVerdict.TIGHT
+
+    def to_result(self) -> dict[str, Any]:
+        """The object that ``borechain wall --json`` prints."""
+        from groundstation.survey.requests.wall_result import wall_result
+
+        return wall_result(self.wall, self.judgement)
 
 
 def scenarios() -> list[str]:
@@ -82,7 +108,7 @@ def drill(scenario: Scenario, seed: int = 1, folder: Path | None = None) -> dict
 
     Returns
     -------
-    The object that ``borechain rig --json`` prints: ``stations``, ``figures``, ``digest`` and more.
+    The object that ``borechain rig --json`` prints: ``stations``, ``figures``, ``station_digest`` and more.
 
     Raises
     ------
@@ -96,15 +122,32 @@ def drill(scenario: Scenario, seed: int = 1, folder: Path | None = None) -> dict
 
 
 def _drill(scenario: Scenario, seed: int, folder: Path) -> dict[str, Any]:
-    from borechain.cli.rig.result import result_of
-    from borechain.cli.rig.rig_command import RigJob, drill_inline
+    from borechain.drilling.drill_hole import drill_inline
+    from borechain.drilling.rig_job import RigJob, show_nothing
     from sim.rig.launcher import prepare_folder
+    from sim.rig.rig_result import rig_result
     from sim.world.world import World
 
     world = World(scenario, seed)
     prepare_folder(folder)
-    ran = drill_inline(world, RigJob(Path("scenario"), seed, math.inf), folder, lambda _progress: None)
-    return result_of(ran.answers, world)
+    run = drill_inline(world, RigJob(Path("scenario"), seed, math.inf, inline=True), folder, show_nothing)
+    return rig_result(run.answers, world)
+
+
+def drill_rig(job: RigJob, watcher: RigWatcher | None = None) -> DrilledRig:
+    """Drill as ``borechain rig`` does: a real process a tube, or inline; a scenario with a site hole by hole.
+
+    Raises
+    ------
+    ScenarioError
+        When the scenario cannot be drilled; nothing was written.
+    RigError, MediumError
+        When the folder or the endpoint cannot be used, a process fails, or on Ctrl-C.
+    """
+    from borechain.drilling import drill_rig as rigs
+    from borechain.drilling.rig_job import RigWatcher
+
+    return rigs.drill_rig(job, watcher or RigWatcher())
 
 
 def survey(
@@ -139,6 +182,32 @@ def survey(
     place = site or Site(9.81, 50_000.0, math.radians(70.0), 0.0, math.radians(52.0))
     record = read_record(Path(file), DisplacementRule(displacement_rule))
     return analyse_survey(record, Method(method), load_tool(instrument), place, section_azimuth)
+
+
+def answer_survey(request: SurveyRequest) -> SurveyAnswer:
+    """A survey with everything that ``borechain survey`` may be asked for; ``result`` is the object of its ``--json``.
+
+    Raises
+    ------
+    SurveyError, ToolError
+        When the record, the instrument or a file cannot be used, or what is asked contradicts itself.
+    """
+    from groundstation.survey.requests import survey_answer
+
+    return survey_answer.answer_survey(request)
+
+
+def answer_clearance(request: ClearanceRequest) -> dict[str, Any]:
+    """How far two holes keep from each other: the object of ``borechain clearance --json``.
+
+    Raises
+    ------
+    SurveyError, ToolError
+        When a record or an instrument cannot be used.
+    """
+    from groundstation.survey.requests import clearance_answer
+
+    return clearance_answer.answer_clearance(request)
 
 
 def wall(file: str | Path) -> JudgedWall:
@@ -189,6 +258,36 @@ def calibrate_attitudes(file: str | Path) -> AttitudeFit:
 
     record = read_attitudes(Path(file))
     return fit_attitudes(true_vectors(record.pitch, record.roll), record.readings)
+
+
+def calibrate(request: CalibrationRequest, day: datetime.date | None = None) -> CalibrationOutcome:
+    """What ``borechain calibrate`` and ``allan`` make of a record: ``result`` is the object of their ``--json``.
+
+    ``day`` of the calibration is that of today in UTC by default.
+
+    Raises
+    ------
+    CalibrationError
+        The file and line, what was expected and what came.
+    """
+    from groundstation.report.calibrations.calibration_answer import answer_calibration
+
+    return answer_calibration(request, (day or datetime.datetime.now(datetime.UTC).date()).isoformat())
+
+
+def replay(recording: Recording, folder: Path) -> dict[str, Any]:
+    """What a new ground station in ``folder`` knows after a recording: the object of ``borechain replay --json``.
+
+    Raises
+    ------
+    RecordingError
+        When the recording holds no intake that can be replayed.
+    """
+    from groundstation.recording.ground_replay import replay_summary
+    from sim.rig.report import station_digest
+
+    known = replay_summary(recording, folder)
+    return known | {"digest": station_digest(known["stations"])}
 
 
 def query(selector: str, endpoint: str = keys.DEFAULT_ENDPOINT, timeout: float = 5.0) -> dict[str, Any]:

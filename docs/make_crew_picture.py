@@ -16,9 +16,9 @@ from typing import Any
 DOCS = Path(__file__).parent
 sys.path[:0] = [str(DOCS.parent)]
 
-from borechain.cli.rig.ground_settings import ground_settings  # noqa: E402
 from borechain.crew.app import CrewApp  # noqa: E402
-from borechain.inline import InlineRig  # noqa: E402
+from borechain.drilling.inline import InlineRig  # noqa: E402
+from sim.rig.ground_settings import ground_settings  # noqa: E402
 from sim.rig.scheduler import Scheduler  # noqa: E402
 from sim.world.scenario import load_scenario  # noqa: E402
 from sim.world.world import World  # noqa: E402

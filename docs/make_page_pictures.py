@@ -18,11 +18,11 @@ sys.path[:0] = [str(DOCS.parent), str(DOCS.parent / "tests" / "tools")]
 from install_browser import find_browser  # noqa: E402
 from playwright.sync_api import expect, sync_playwright  # noqa: E402
 
-from borechain.cli.rig.ground_settings import ground_settings  # noqa: E402
-from borechain.inline import InlineRig  # noqa: E402
+from borechain.drilling.inline import InlineRig  # noqa: E402
 from groundstation.gateway.page.page_settings import PageSettings, open_page_socket  # noqa: E402
 from groundstation.gateway.page.passwords import hash_of  # noqa: E402
 from groundstation.gateway.page.server import serving_page  # noqa: E402
+from sim.rig.ground_settings import ground_settings  # noqa: E402
 from sim.rig.scheduler import Scheduler  # noqa: E402
 from sim.world.scenario import load_scenario  # noqa: E402
 from sim.world.world import World  # noqa: E402

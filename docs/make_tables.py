@@ -22,7 +22,7 @@ from groundstation.survey.fusion.survey_trust import EFFECTS, TOGETHER  # noqa: 
 from telemetry.application.arguments import shown_name, shown_range  # noqa: E402
 from telemetry.application.commands import COMMANDS, Argument, CommandSpec  # noqa: E402
 from telemetry.quantities import Quantity  # noqa: E402
-from telemetry.schema import SCHEMA, Field, MessageSpec  # noqa: E402
+from telemetry.schema import SCHEMA, MessageField, MessageSpec  # noqa: E402
 
 
 def table(head: Iterable[str], lines: Iterable[Iterable[str]]) -> str:
@@ -54,7 +54,7 @@ def fields_of(spec: MessageSpec) -> str:
     return table(head, [field_row(field) for field in spec.fields])
 
 
-def field_row(f: Field) -> tuple[str, ...]:
+def field_row(f: MessageField) -> tuple[str, ...]:
     """One field of a message."""
     return f"`{f.key}`", f.name, f.kind.value, f.unit, f.range_text, f.step_text, str(f.since), f.meaning
 

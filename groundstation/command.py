@@ -2,135 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
-from groundstation.page_options import page_options, page_settings
+from groundstation.ground_options import GroundRequest, ground_options
+from groundstation.page_options import PageRequest, page_settings
 from telemetry.runtime.command_line import plain_faults, require_modules
-from telemetry.runtime.process_options import clock_option, key_option, keys_option, place_options
-
-TOLERANCES = ("en-12716", "5-cm", "0.27-deg")
-POSITIVE = click.FloatRange(0.0, min_open=True)
-WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
+from telemetry.runtime.process_options import PlaceRequest
 
 
 @click.command()
-@click.option("--tube-length-m", type=POSITIVE, default=2.0, show_default=True, help="Length of every tube.")
-@click.option("--target-m", type=POSITIVE, default=30.0, show_default=True, help="Length of the design axis.")
-@click.option(
-    "--design-inclination-deg",
-    type=click.FloatRange(0.0, 180.0),
-    default=0.0,
-    show_default=True,
-    help="Of the design axis; 0 is vertical.",
-)
-@click.option("--design-azimuth-deg", type=float, default=0.0, show_default=True, help="Of the design axis.")
-@click.option("--column-radius-m", type=POSITIVE, default=0.6, show_default=True, help="Radius of the finished column.")
-@click.option(
-    "--tolerance",
-    type=click.Choice(TOLERANCES),
-    default=TOLERANCES[0],
-    show_default=True,
-    help="Limit of the deviation from the design axis.",
-)
-@click.option(
-    "--steering-deg-per-m",
-    type=POSITIVE,
-    default=0.5,
-    show_default=True,
-    help="The most by which this rig bends a hole back; until where a correction still helps follows from it.",
-)
-@click.option(
-    "--string-transport",
-    type=click.Choice(("shortest", "parallel")),
-    default="shortest",
-    show_default=True,
-    help="Yaw of a tube in a bent hole: that of the head, or as a shaft without twist carries it along.",
-)
-@click.option(
-    "--collar-inclination-deg",
-    type=click.FloatRange(0.0, 180.0, max_open=True),
-    default=0.0,
-    show_default=True,
-    help="Of the hole at the collar, where the head holds the string.",
-)
-@click.option("--collar-azimuth-deg", type=float, default=0.0, show_default=True, help="Of the hole at the collar.")
-@click.option(
-    "--collar-std-deg",
-    type=click.FloatRange(0.0),
-    default=0.0,
-    show_default=True,
-    help="Standard error of the direction at the collar, each way.",
-)
-@click.option(
-    "--weighting",
-    type=click.Choice(WEIGHTINGS),
-    default=WEIGHTINGS[0],
-    show_default=True,
-    help="How the measurements of one station are weighted.",
-)
-@click.option(
-    "--accelerometer-bias-std-deg",
-    type=click.FloatRange(0.0),
-    default=0.06,
-    show_default=True,
-    help="Accelerometer bias as a tilt, standard deviation: 1 mg of the bare sensor, 0.002 of calibrated ones.",
-)
-@click.option(
-    "--mount-std-deg",
-    type=click.FloatRange(0.0),
-    default=0.05,
-    show_default=True,
-    help="Standard error of an IMU's mounting about its tube's axis.",
-)
-@click.option(
-    "--wall",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="Wall file of which this hole is a column: its joints are judged while it is drilled.",
-)
-@click.option("--hole", default="", help="Name of this hole in the wall file.")
-@click.option(
-    "--database",
-    metavar="URL",
-    help="Where surveys and alarms are kept, such as postgresql://USER@HOST/NAME; the password from PGPASSWORD or "
-    "~/.pgpass  [default: SQLite in the folder]",
-)
-@page_options
-@clock_option
-@key_option
-@keys_option
-@place_options
+@ground_options
 @require_modules("orjson", "scipy", "sqlalchemy")
 @plain_faults
-def ground(
-    tube_length_m: float,
-    target_m: float,
-    design_inclination_deg: float,
-    design_azimuth_deg: float,
-    column_radius_m: float,
-    tolerance: str,
-    steering_deg_per_m: float,
-    string_transport: str,
-    collar_inclination_deg: float,
-    collar_azimuth_deg: float,
-    collar_std_deg: float,
-    weighting: str,
-    accelerometer_bias_std_deg: float,
-    mount_std_deg: float,
-    wall: Path | None,
-    hole: str,
-    database: str | None,
-    page: str | None,
-    page_tls: tuple[Path, Path] | None,
-    page_passwords: Path | None,
-    clock: str,
-    key_file: Path | None,
-    keys_place: Path | None,
-    rig_name: str,
-    endpoint: str,
-    folder: Path,
-) -> None:
+def ground(request: GroundRequest, place: PlaceRequest, served: PageRequest, clock: str) -> None:
     """Run the ground station of one rig.
 
     \b
@@ -138,31 +22,7 @@ def ground(
       borechain ground --folder state/ground --tube-length-m 2
       borechain ground --page 127.0.0.1:8080 --page-passwords passwords
     """
-    from groundstation.host import run_ground
-    from telemetry.runtime.hosting import Place
+    from groundstation.ground_host import run_ground
 
-    settings = {
-        "tube_length": tube_length_m,
-        "target": target_m,
-        "design_inclination_deg": design_inclination_deg,
-        "design_azimuth_deg": design_azimuth_deg,
-        "column_radius": column_radius_m,
-        "tolerance": tolerance,
-        "steering_deg_per_m": steering_deg_per_m,
-        "string_transport": string_transport,
-        "collar_inclination_deg": collar_inclination_deg,
-        "collar_azimuth_deg": collar_azimuth_deg,
-        "collar_std_deg": collar_std_deg,
-        "weighting": weighting,
-        "accelerometer_bias_std_deg": accelerometer_bias_std_deg,
-        "mount_std_deg": mount_std_deg,
-        "wall": wall,
-        "hole": hole,
-        "database_url": database,
-    }
-    run_ground(
-        Place(rig_name, endpoint, folder, key_file, keys=keys_place),
-        settings,
-        own_clock=clock == "own",
-        page=page_settings(page, page_tls, page_passwords),
-    )
+    own_clock, page = clock == "own", page_settings(served)
+    run_ground(place.to_place(), request.to_settings(), own_clock=own_clock, page=page)

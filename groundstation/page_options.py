@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +39,16 @@ def page_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def page_settings(page: str | None, tls: tuple[Path, Path] | None, passwords: Path | None) -> PageSettings | None:
+@dataclass(frozen=True, slots=True)
+class PageRequest:
+    """The options as they were given."""
+
+    page: str | None = None
+    page_tls: tuple[Path, Path] | None = None
+    page_passwords: Path | None = None
+
+
+def page_settings(asked: PageRequest) -> PageSettings | None:
     """Settings of the options as they were given to the command that runs; None without a page.
 
     Raises
@@ -53,6 +63,7 @@ def page_settings(page: str | None, tls: tuple[Path, Path] | None, passwords: Pa
     from groundstation.errors import ConfigurationError
     from telemetry.runtime.command_line import check_installed
 
+    page, tls, passwords = asked.page, asked.page_tls, asked.page_passwords
     if page is None:
         if tls or passwords is not None:
             raise ConfigurationError("page-tls, page-passwords: expected --page with them")

@@ -31,7 +31,7 @@ class SimLocator(SourceLocator):
         )
 
 
-def compiled(function: Function, **options: Any) -> Function:
+def compile_function(function: Function, **options: Any) -> Function:
     """Have ``function`` compiled with the node's options and these when it is first called."""
     with kept_where(SimLocator):
         return cast("Function", njit(**OPTIONS | options)(function))
@@ -39,7 +39,7 @@ def compiled(function: Function, **options: Any) -> Function:
 
 def kernel(function: Function) -> Function:
     """Compile ``function`` on its first call or load it from the cache."""
-    return compiled(function)
+    return compile_function(function)
 
 
 def shared_body(function: Function) -> Function:
@@ -47,4 +47,4 @@ def shared_body(function: Function) -> Function:
 
     What stands under ``if argument is not None`` is left out where a kernel is given None.
     """
-    return compiled(function, inline="always")
+    return compile_function(function, inline="always")

@@ -43,7 +43,7 @@ class Side(enum.IntEnum):
     LOWER = 1
 
 
-class Mode(enum.IntEnum):
+class NodeMode(enum.IntEnum):
     """State of a node (execution states, node specification section 2)."""
 
     BOOT = 0
@@ -118,7 +118,7 @@ class Hello(Frozen):
     tube: int
     boot_count: int
     hops: int  # from the encoder, HOPS_UNKNOWN before an upper neighbour told
-    mode: Mode
+    mode: NodeMode
     link_quality: float  # 0..1, share of this side's frames lately acknowledged or expected and received
 
 
@@ -146,7 +146,7 @@ class NodeState(Frozen):
     tube: int
     at: float  # s, rig time
     hops: int
-    mode: Mode
+    mode: NodeMode
     yaw: float  # rad, [0, 2 pi)
     yaw_var: float  # rad^2, random part
     systematic_var: float  # rad^2

@@ -60,7 +60,7 @@ class Quantity:
             return f"+-{self.high:g}"
         if math.isinf(self.low) and math.isinf(self.high):
             return ""
-        return f"{bound(self.low)}..{bound(self.high)}"
+        return f"{bound_text(self.low)}..{bound_text(self.high)}"
 
     @property
     def step_text(self) -> str:
@@ -73,7 +73,7 @@ class Quantity:
 POWERS_OF_TWO = {2**power: f"2^{power}" for power in range(20, 64)}
 
 
-def bound(value: float) -> str:
+def bound_text(value: float) -> str:
     """One end of a range, large integers as powers of two."""
     if isinstance(value, int):
         return POWERS_OF_TWO.get(value) or (

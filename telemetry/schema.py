@@ -23,8 +23,8 @@ from telemetry.messages import (
     DepthReading,
     Event,
     Hello,
-    Mode,
     NodeFlag,
+    NodeMode,
     NodeState,
     Receipt,
     Reply,
@@ -39,7 +39,7 @@ from telemetry.messages import (
 from telemetry.quantities import Quantity, ValueKind
 
 
-class Kind(IntEnum):
+class MessageKind(IntEnum):
     """Type of a message on the wire."""
 
     AIDING = 1
@@ -60,7 +60,7 @@ class Kind(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Field(Quantity):
+class MessageField(Quantity):
     """One field of a message.
 
     A field of a later schema version (``since``) has the value that stands for it in payloads of earlier ones
@@ -78,10 +78,10 @@ class MessageSpec:
     """One message: its type, number, how it travels, how long its sender keeps it, and its fields in order."""
 
     message: type[Any]
-    kind: Kind
+    kind: MessageKind
     travels: str
     kept: str
-    fields: tuple[Field, ...]
+    fields: tuple[MessageField, ...]
 
     @property
     def newest(self) -> int:
@@ -89,45 +89,47 @@ class MessageSpec:
         return max(field.since for field in self.fields)
 
 
-def _number(name: str, key: str, unit: str, low: float, high: float, meaning: str, **more: Any) -> Field:
-    return Field(name, ValueKind.NUMBER, meaning, unit, low, high, key=key, **more)
+def _number(name: str, key: str, unit: str, low: float, high: float, meaning: str, **more: Any) -> MessageField:
+    return MessageField(name, ValueKind.NUMBER, meaning, unit, low, high, key=key, **more)
 
 
-def _integer(name: str, key: str, low: int, high: int, meaning: str, **more: Any) -> Field:
-    return Field(name, ValueKind.INTEGER, meaning, "1", low, high, key=key, **more)
+def _integer(name: str, key: str, low: int, high: int, meaning: str, **more: Any) -> MessageField:
+    return MessageField(name, ValueKind.INTEGER, meaning, "1", low, high, key=key, **more)
 
 
-def _variance(name: str, key: str, unit: str, high: float, meaning: str, **more: Any) -> Field:
-    return Field(name, ValueKind.NUMBER, meaning, unit, 0.0, high, key=key, step_db=VARIANCE_STEP, **more)
+def _variance(name: str, key: str, unit: str, high: float, meaning: str, **more: Any) -> MessageField:
+    return MessageField(name, ValueKind.NUMBER, meaning, unit, 0.0, high, key=key, step_db=VARIANCE_STEP, **more)
 
 
-def _vector(name: str, key: str, unit: str, limit: float, meaning: str, **more: Any) -> Field:
-    return Field(name, ValueKind.VECTOR, meaning, unit, -limit, limit, key=key, **more)
+def _vector(name: str, key: str, unit: str, limit: float, meaning: str, **more: Any) -> MessageField:
+    return MessageField(name, ValueKind.VECTOR, meaning, unit, -limit, limit, key=key, **more)
 
 
-def _covariance(name: str, key: str, unit: str, meaning: str) -> Field:
-    return Field(name, ValueKind.COVARIANCE, meaning, unit, -1e6, 1e6, key=key)
+def _covariance(name: str, key: str, unit: str, meaning: str) -> MessageField:
+    return MessageField(name, ValueKind.COVARIANCE, meaning, unit, -1e6, 1e6, key=key)
 
 
-def _boolean(name: str, key: str, meaning: str, **more: Any) -> Field:
-    return Field(name, ValueKind.BOOLEAN, meaning, key=key, **more)
+def _boolean(name: str, key: str, meaning: str, **more: Any) -> MessageField:
+    return MessageField(name, ValueKind.BOOLEAN, meaning, key=key, **more)
 
 
-def _text(name: str, key: str, meaning: str) -> Field:
-    return Field(name, ValueKind.TEXT, meaning, key=key)
+def _text(name: str, key: str, meaning: str) -> MessageField:
+    return MessageField(name, ValueKind.TEXT, meaning, key=key)
 
 
-def _binary(name: str, key: str, low: int, high: int, meaning: str, **more: Any) -> Field:
-    return Field(name, ValueKind.BINARY, meaning, "bytes", low, high, key=key, **more)
+def _binary(name: str, key: str, low: int, high: int, meaning: str, **more: Any) -> MessageField:
+    return MessageField(name, ValueKind.BINARY, meaning, "bytes", low, high, key=key, **more)
 
 
-def _time(name: str, key: str, meaning: str) -> Field:
-    return Field(name, ValueKind.NUMBER, meaning, "s", -LARGEST_TIME, LARGEST_TIME, key=key, step=TIME_STEP)
+def _time(name: str, key: str, meaning: str) -> MessageField:
+    return MessageField(name, ValueKind.NUMBER, meaning, "s", -LARGEST_TIME, LARGEST_TIME, key=key, step=TIME_STEP)
 
 
-def _margin(name: str, key: str, where: str) -> Field:
+def _margin(name: str, key: str, where: str) -> MessageField:
     meaning = f"of the frames from {where} over the radio's threshold; inf without a radio, or with none heard"
-    return Field(name, ValueKind.NUMBER, meaning, "dB", -200.0, math.inf, key=key, since=4, before=math.inf, step=0.5)
+    return MessageField(
+        name, ValueKind.NUMBER, meaning, "dB", -200.0, math.inf, key=key, since=4, before=math.inf, step=0.5
+    )
 
 
 TURN, VARIANCE, TORQUE, U32, U53 = math.tau, 100.0, 1e6, 2**32 - 1, 2**53
@@ -148,9 +150,9 @@ YAW_VAR = _variance("yaw_var", "yv", "rad^2", VARIANCE, "random variance of the 
 SYSTEMATIC = _variance("systematic_var", "sv", "rad^2", VARIANCE, "constant errors of joints; never averages away")
 FLAGS = _integer("flags", "f", 0, 0xFFFF, "trust in the own yaw, bits of the table below", enumeration=NodeFlag)
 EPOCH = _integer("epoch", "ep", 0, MAX_EPOCH, "of rig time: starts of the encoder so far, 0 unknown", since=4, before=0)
-MODE = _integer("mode", "m", 0, 7, "execution state", enumeration=Mode)
+MODE = _integer("mode", "m", 0, 7, "execution state", enumeration=NodeMode)
 DIGEST = _binary("digest", "d", 32, 32, "SHA-256 of the whole block")
-ARGUMENTS = Field("arguments", ValueKind.SCALARS, "by name", key="a")
+ARGUMENTS = MessageField("arguments", ValueKind.SCALARS, "by name", key="a")
 ONE_HOP, UP, DOWN, ONCE = "one hop", "up", "down", "sent once"
 EACH_HOP = "acknowledged on each hop"
 RECEIPTED = "the ground station's receipt"
@@ -158,7 +160,7 @@ RECEIPTED = "the ground station's receipt"
 SCHEMA: tuple[MessageSpec, ...] = (
     MessageSpec(
         Aiding,
-        Kind.AIDING,
+        MessageKind.AIDING,
         ONE_HOP,
         ONCE,
         (
@@ -191,7 +193,7 @@ SCHEMA: tuple[MessageSpec, ...] = (
     ),
     MessageSpec(
         Hello,
-        Kind.HELLO,
+        MessageKind.HELLO,
         ONE_HOP,
         ONCE,
         (
@@ -202,10 +204,10 @@ SCHEMA: tuple[MessageSpec, ...] = (
             _number("link_quality", "q", "1", 0.0, 1.0, "share of this side's frames received lately", step=0.01),
         ),
     ),
-    MessageSpec(TimeRequest, Kind.TIME_REQUEST, ONE_HOP, ONCE, (_time("asked_at", "a", "clock of the asker"),)),
+    MessageSpec(TimeRequest, MessageKind.TIME_REQUEST, ONE_HOP, ONCE, (_time("asked_at", "a", "clock of the asker"),)),
     MessageSpec(
         TimeReply,
-        Kind.TIME_REPLY,
+        MessageKind.TIME_REPLY,
         ONE_HOP,
         ONCE,
         (
@@ -220,7 +222,7 @@ SCHEMA: tuple[MessageSpec, ...] = (
     ),
     MessageSpec(
         NodeState,
-        Kind.NODE_STATE,
+        MessageKind.NODE_STATE,
         UP,
         "sent once, the newest wins",
         (
@@ -262,7 +264,7 @@ SCHEMA: tuple[MessageSpec, ...] = (
     ),
     MessageSpec(
         SurveyMeasurement,
-        Kind.SURVEY_MEASUREMENT,
+        MessageKind.SURVEY_MEASUREMENT,
         UP,
         RECEIPTED,
         (
@@ -270,7 +272,9 @@ SCHEMA: tuple[MessageSpec, ...] = (
             SEQUENCE,
             _time("station_at", "at", "rig time, end of the moving average"),
             HOPS,
-            Field("imus", ValueKind.IMUS, "mean specific force of each IMU and its covariance", "m/s^2", key="i"),
+            MessageField(
+                "imus", ValueKind.IMUS, "mean specific force of each IMU and its covariance", "m/s^2", key="i"
+            ),
             YAW,
             YAW_VAR,
             SYSTEMATIC,
@@ -282,7 +286,7 @@ SCHEMA: tuple[MessageSpec, ...] = (
     ),
     MessageSpec(
         Receipt,
-        Kind.RECEIPT,
+        MessageKind.RECEIPT,
         DOWN,
         EACH_HOP,
         (
@@ -295,14 +299,14 @@ SCHEMA: tuple[MessageSpec, ...] = (
     ),
     MessageSpec(
         Command,
-        Kind.COMMAND,
+        MessageKind.COMMAND,
         DOWN,
         "its reply",
         (ADDRESSEE, ORDER_NUMBER, _text("name", "n", "of the command, see the key `cmd`"), ARGUMENTS),
     ),
     MessageSpec(
         Reply,
-        Kind.REPLY,
+        MessageKind.REPLY,
         UP,
         f"{EACH_HOP}, kept for repeated commands",
         (
@@ -310,12 +314,12 @@ SCHEMA: tuple[MessageSpec, ...] = (
             ORDER_NUMBER,
             _boolean("done", "d", "the order was obeyed"),
             _text("detail", "x", "why it was refused, or what happens now"),
-            Field("values", ValueKind.VALUES, "what the command's table promises", key="w", since=3, before={}),
+            MessageField("values", ValueKind.VALUES, "what the command's table promises", key="w", since=3, before={}),
         ),
     ),
     MessageSpec(
         Event,
-        Kind.EVENT,
+        MessageKind.EVENT,
         UP,
         RECEIPTED,
         (
@@ -330,7 +334,7 @@ SCHEMA: tuple[MessageSpec, ...] = (
     ),
     MessageSpec(
         BlockSegment,
-        Kind.BLOCK_SEGMENT,
+        MessageKind.BLOCK_SEGMENT,
         DOWN,
         f"{EACH_HOP}; the upload repeats it until the node has it",
         (
@@ -346,7 +350,7 @@ SCHEMA: tuple[MessageSpec, ...] = (
     ),
     MessageSpec(
         BlockStatus,
-        Kind.BLOCK_STATUS,
+        MessageKind.BLOCK_STATUS,
         UP,
         f"{EACH_HOP}; the next segment asks for it again",
         (
@@ -362,7 +366,7 @@ SCHEMA: tuple[MessageSpec, ...] = (
     ),
     MessageSpec(
         StaticRecord,
-        Kind.STATIC_RECORD,
+        MessageKind.STATIC_RECORD,
         UP,
         RECEIPTED,
         (
@@ -383,17 +387,19 @@ SCHEMA: tuple[MessageSpec, ...] = (
     ),
     MessageSpec(
         DepthReading,
-        Kind.DEPTH_READING,
+        MessageKind.DEPTH_READING,
         "on its own key",
         "overwritten: every reading repeats the last stands",
         (
             _integer("sequence", "s", 0, U53, "counted up by the source"),
             _time("at", "at", "rig time"),
             _number("md", "md", "m", 0.0, DEEPEST, "of the bit", step=1e-3),
-            Field("stands", ValueKind.STANDS, "last stands of the bit, oldest first", "m", 0.0, DEEPEST, key="st"),
+            MessageField(
+                "stands", ValueKind.STANDS, "last stands of the bit, oldest first", "m", 0.0, DEEPEST, key="st"
+            ),
             EPOCH,
         ),
     ),
-    MessageSpec(SessionOffer, Kind.SESSION_OFFER, DOWN, "offered again until it is taken", (ADDRESSEE,)),
+    MessageSpec(SessionOffer, MessageKind.SESSION_OFFER, DOWN, "offered again until it is taken", (ADDRESSEE,)),
 )
 SPEC_OF: dict[type[Any], MessageSpec] = {spec.message: spec for spec in SCHEMA}

@@ -20,9 +20,9 @@ LINE = """
     ),
 """
 METHOD = '''
-    def blink(self, arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+    def blink(self, arguments: Mapping[str, Any], _sequence: int) -> CommandOutcome:
         """Light the lamp."""
-        return Outcome(True, "blinking", {"times": arguments["times"]})
+        return CommandOutcome(True, "blinking", {"times": arguments["times"]})
 '''
 PROGRAM = """
 import json, sys
@@ -34,7 +34,7 @@ from node.firmware.tube_settings import TubeSettings
 from node.process.tube_process import TubeProcess
 folder = Path(sys.argv[1])
 ground = GroundProcess(GroundConfig(folder=folder / "ground"))
-ground.model.tally.restore([1])
+ground.model.string.tally.restore([1])
 order = ground.operator.order("blink", {"tube": "1", "times": "5"})
 try:
     ground.operator.order("blink", {"tube": "1", "times": "10"})

@@ -110,7 +110,7 @@ def simulate_records(seed):
 )
 DISTURBANCE = Addition(
     row="a disturbance",
-    table="sim/world/disturbance/table.py",
+    table="sim/world/disturbance/disturbance_table.py",
     head="TABLE: Final[tuple[Disturbance, ...]] = (\n",
     line="    HUM,\n    CREAK,\n",
     imports="from sim.world.disturbance.hum import CREAK, HUM\n",
@@ -123,26 +123,26 @@ import numpy as np
 from sim.kernel import shared_body
 from sim.world.disturbance.lanes import Lane
 from sim.world.disturbance.row import ActsOn, Compiled, Disturbance
-from sim.world.section import NotNegative, Section
-from sim.world.streams import stream
+from sim.world.section import NotNegative, ScenarioSection
+from sim.world.random_streams import random_stream
 
 PURPOSE = 99
 
 
-class HumSection(Section):
+class HumSection(ScenarioSection):
     size_rps: NotNegative = 0.0
     noise_rps: NotNegative = 0.0
 
 
 def draw(imu):
     section = imu.section_of(HUM)
-    return section.size_rps * float(stream(imu.seed, PURPOSE, imu.tube).random()), section.noise_rps
+    return section.size_rps * float(random_stream(imu.seed, PURPOSE, imu.tube).random()), section.noise_rps
 
 
 def hum(samples, imu, drawn):
     size, noise = drawn
     white = noise / math.sqrt(1.9 * samples.period)
-    white = white * stream(imu.seed, PURPOSE, imu.tube, 1).standard_normal(len(samples.t))
+    white = white * random_stream(imu.seed, PURPOSE, imu.tube, 1).standard_normal(len(samples.t))
     samples.rate = samples.rate + np.outer(size * np.sin(0.01 * samples.t) + white, [0.0, 0.0, 1.0])
 
 
@@ -349,7 +349,7 @@ def test_an_added_disturbance_acts_in_a_plain_rig_a_rough_rig_and_a_campaign_or_
         from sim.campaign.chunk import Campaign
         from sim.errors import ScenarioError
         from sim.string.hops import draw_hops
-        from sim.string.readings import supply_readings
+        from sim.string.reading_suppliers import supply_readings
         from sim.world.scenario import scenario_of
         from sim.world.world import World
 
@@ -422,7 +422,7 @@ DESCRIBED = """
     from groundstation.service.answers.model import RigModel
     from groundstation.service.answers.paths import find_path
 
-    model = RigModel(GroundConfig(folder=pathlib.Path(tempfile.mkdtemp())))
+    model = RigModel.begin(GroundConfig(folder=pathlib.Path(tempfile.mkdtemp())))
     def answered(path, **parameters):
         return json.loads(find_path(model, path).json(model, parameters))
 """

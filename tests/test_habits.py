@@ -1,17 +1,26 @@
 """Habits: every target is explained, every result has its caption, hook and check run what they claim to run."""
 
+import ast
+import inspect
 import re
 import subprocess
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from textwrap import dedent
+from typing import Any
 
+import click
 import pytest
 import yaml
 
+from borechain.__main__ import cli
+from node.process.command_group import commands
 from sim.studies.study_table import STUDIES
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "docs" / "results"
 DECISIONS = ROOT / "docs" / "decisions"
+MOST_PARAMETERS, MOST_LINES = 10, 40  # of the function of a command
 
 
 def targets() -> dict[str, str]:
@@ -160,6 +169,31 @@ def test_every_link_of_a_document_leads_somewhere(page: Path) -> None:
     assert lost == []
 
 
+def callbacks(command: click.Command, context: click.Context) -> Iterator[Callable[..., Any]]:
+    """Functions of a command and of all below it, without what decorates them."""
+    if command.callback is not None:
+        yield inspect.unwrap(command.callback)
+    if isinstance(command, click.Group):
+        for name in command.list_commands(context):
+            found = command.get_command(context, name)
+            assert found is not None
+            yield from callbacks(found, click.Context(found, parent=context, info_name=name))
+
+
+def test_a_command_is_options_one_call_and_print() -> None:
+    functions = {f for group in (cli, commands) for f in callbacks(group, click.Context(group))}
+    assert len(functions) > 40
+    large = []
+    for function in functions:
+        (node,) = ast.parse(dedent(inspect.getsource(function))).body
+        assert isinstance(node, ast.FunctionDef)
+        lines = (node.end_lineno or node.lineno) - node.lineno + 1
+        taken = len(inspect.signature(function).parameters)
+        if lines > MOST_LINES or taken > MOST_PARAMETERS:
+            large.append(f"{function.__module__}.{function.__name__}: {taken} parameters, {lines} lines")
+    assert large == []
+
+
 ODD = re.compile(
     r"(?i:\b(whoever|nobody|somebody|whence|thereof|as nearly always|who asks)\b|is no (number|time|measurement)\b)"
     r"|\b[Tt]hat is none\b"
@@ -177,7 +211,6 @@ EXCUSED = {  # file or folder: why the phrases stand there
     "CONTRIBUTING.md": "quotes one as the example of what not to write",
     "tests/test_habits.py": "lists them",
     "tests/tools/postgres.py": "the name of a user of the operating system",
-    "node/kernels": "a changed line there compiles every kernel anew; they go with the next change of the kernels",
 }
 
 

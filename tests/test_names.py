@@ -25,7 +25,23 @@ MODULES = {
     "strapdown": "the two forms of the filter, alike by contract",
     "update": "the two forms of the filter, alike by contract",
 }
-FUNCTIONS: dict[str, str] = {}
+FUNCTIONS = {
+    "arcsine": "the name of the function in mathematics",
+    "arctangent": "the name of the function in mathematics",
+    "calibrate": "a verb of the public API of notebooks",
+    "dogleg": "the field's term for the angle between two directions",
+    "drill": "a verb of the public API of notebooks",
+    "kernel": "the decorator that makes one, read as a word at each",
+    "load": "a verb of the public API of notebooks",
+    "main": "entry point of a program, the name that tools look for",
+    "quantile": "the name of the function in statistics",
+    "query": "a verb of the public API of notebooks",
+    "replay": "a verb of the public API of notebooks",
+    "scenarios": "a verb of the public API of notebooks",
+    "sinc": "the name of the function in mathematics",
+    "survey": "a verb of the public API of notebooks",
+    "wall": "a verb of the public API of notebooks",
+}
 
 
 def modules() -> Iterator[tuple[Path, ast.Module]]:

@@ -1,19 +1,19 @@
-"""Warnings of models and scenarios as lines for people."""
+"""Lines for people on stderr, beside what a command prints."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 
 import click
 
+from telemetry.runtime.warning_lines import telling_warnings
 
-@contextmanager
-def warnings_in_lines() -> Iterator[None]:
+
+def print_notice(line: str) -> None:
+    """Say something that is no part of the output."""
+    click.echo(line, err=True)
+
+
+def warnings_in_lines() -> AbstractContextManager[None]:
     """Say every warning once, in one line on stderr."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        yield
-    for message in dict.fromkeys(str(warning.message) for warning in caught):
-        click.echo(f"Warning: {message}", err=True)
+    return telling_warnings(print_notice)

@@ -13,7 +13,7 @@ from borechain.gauntlet.gauntlet_rig import GauntletRig
 from node.process.tube_process import TubeProcess
 from sim.gauntlet import readings
 from sim.gauntlet.fault import TUBES
-from telemetry.messages import BASE, ENCODER, Mode
+from telemetry.messages import BASE, ENCODER, NodeMode
 
 AROUND = 10.0  # s before and after an instant that a tube must have watched to speak of it
 
@@ -90,7 +90,7 @@ class FaultObservability:
         if any(one not in stepper.processes for one in chain):
             return False
         has_gyroscope = self._rig.world.spoilers.get(tube) in (None, *readings.OF_FORCE)
-        return has_gyroscope and process.tube.state["mode"] != Mode.STATIC_BIAS
+        return has_gyroscope and process.tube.state["mode"] != NodeMode.STATIC_BIAS
 
     def _shown(self) -> tuple[int, float | None]:
         return self._rig.world.slipped, self._rig.world.stuck_at

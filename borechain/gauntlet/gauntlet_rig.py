@@ -11,7 +11,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from groundstation.service.process.ground_process import GroundProcess
 from node.process.tube_process import TubeProcess
 from sim.gauntlet.fault import EVERYBODY, Step
@@ -20,7 +20,7 @@ from sim.gauntlet.faulty_disk import FaultyDisk
 from sim.gauntlet.faulty_stepper import FaultyStepper
 from sim.gauntlet.faulty_world import DRILLED_IN, MINUTE, TUBE_LENGTH, FaultyWorld
 from sim.rig.scheduler import Scheduler
-from sim.world.streams import Stream, stream
+from sim.world.random_streams import RandomStream, random_stream
 from telemetry.messages import BASE, Side
 
 LOOK_EVERY = 5.0  # s between two looks of an observer
@@ -69,7 +69,7 @@ class GauntletRig:
         self.world = world
         self._disks = dict(disks)
         self._settled = dict(disks)
-        lots = stream(seed, Stream.LOTS)
+        lots = random_stream(seed, RandomStream.LOTS)
         self.inline = InlineRig(
             world, settings, "rig-1", folder, lambda below: int(lots.integers(below)), disk_of=self.disk
         )
@@ -170,7 +170,7 @@ class GauntletRig:
             self._disks[address].refusal, self._disks[address].writes_left = 0, -1
             self.thaw(address)
             self.start(address)
-        if self.ground is not None and self.ground.model.depths.jumped:
+        if self.ground is not None and self.ground.model.string.depths.jumped:
             self.inline.command("accept_depth", {"action": "confirm"})
 
     def close(self) -> None:
@@ -192,7 +192,7 @@ class GauntletRig:
         if tube is None:
             self._disks[address], self.stepper.builders[address] = self._settled[address], self._builders[address]
             return
-        draws = stream(self._seed, Stream.GAUNTLET, 3, address, next(self._strangers))
+        draws = random_stream(self._seed, RandomStream.GAUNTLET, 3, address, next(self._strangers))
         self._disks[address] = FaultyDisk(draws)
         settings, folder = self.world.tube_settings(tube), self._folder / "state" / "stranger"
         self.stepper.builders[address] = partial(TubeProcess, settings, folder, disk=self._disks[address])
@@ -202,7 +202,7 @@ def new_rig(plan: str, seed: int, folder: Path) -> GauntletRig:
     """The rig of a seed, ready to be drilled with."""
     chosen = PLANS[plan]
     world, kept = started_world(plan, seed % WORLDS)
-    disks = {a: kept[a].copied(stream(seed, Stream.GAUNTLET, 4, a)) for a in EVERYBODY}
+    disks = {a: kept[a].copied(random_stream(seed, RandomStream.GAUNTLET, 4, a)) for a in EVERYBODY}
     rig = GauntletRig(world.healthy(), disks, chosen.settings, seed, folder)
     rig.begin(world.begin + chosen.rested)
     return rig
@@ -226,7 +226,7 @@ def started_world(plan: str, number: int) -> tuple[FaultyWorld, dict[int, Faulty
     """
     chosen = PLANS[plan]
     world = FaultyWorld.of_tables(chosen.tables, number)
-    disks = {a: FaultyDisk(stream(number, Stream.GAUNTLET, 5, a)) for a in EVERYBODY}
+    disks = {a: FaultyDisk(random_stream(number, RandomStream.GAUNTLET, 5, a)) for a in EVERYBODY}
     if chosen.rested:
         with tempfile.TemporaryDirectory(prefix="gauntlet-") as folder:
             rig = GauntletRig(world.healthy(), disks, chosen.settings, number, Path(folder))

@@ -7,21 +7,24 @@ import shutil
 import tempfile
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from borechain.drilling.rare_collection import rare_collection
 from borechain.gauntlet.fault_observability import FaultObservability
 from borechain.gauntlet.gauntlet_rig import PLANS, GauntletRig, make_ready, new_rig
 from borechain.gauntlet.oracles import Observer, find_violations
-from borechain.rare_collection import rare_collection
 from sim.gauntlet.fault_kinds import KINDS
 from sim.gauntlet.plan import drawn_kinds, steps_of
-from sim.rig.report import digest
+from sim.rig.report import station_digest
+from sim.studies.pool import over_cores
 
 ALL = tuple(kind.name for kind in KINDS)
 USUAL = "minute"
+WORTH_A_PROCESS = 50  # seeds, for which a process more is started
+BATCH = 200  # seeds whose outcomes are given at a time
 FEW = 2  # kinds of faults that may never mislead the crew without a word, whatever can be seen
 
 
@@ -70,6 +73,15 @@ def judge_seed(job: tuple[int, Sequence[str], Sequence[str] | None, str]) -> See
     return shrink_outcome(outcome) if outcome.violations else outcome
 
 
+def judge_seeds(
+    seeds: Sequence[int], allowed: Sequence[str], kinds: Sequence[str] | None, plan: str
+) -> Iterator[SeedOutcome]:
+    """Outcomes of many seeds on all cores, in order; arguments as ``judge_seed``."""
+    with over_cores(len(seeds) // WORTH_A_PROCESS, lambda: None) as run_all:
+        for batch in (seeds[k : k + BATCH] for k in range(0, len(seeds), BATCH)):
+            yield from run_all(judge_seed, [(number, allowed, kinds, plan) for number in batch])
+
+
 def shrink_outcome(outcome: SeedOutcome) -> SeedOutcome:
     """Return the failing seed with the fewest kinds that still make it fail."""
     kept, worst = list(outcome.kinds), outcome
@@ -94,7 +106,9 @@ def _run(rig: GauntletRig, outcome: SeedOutcome) -> None:
         outcome.violations = ["the ground station is not there at the end"]
         return
     rows = _alarms(rig)
-    outcome.digest = hashlib.sha256(f"{digest(rig.inline.ask('stations')['stations'])}{rows}".encode()).hexdigest()
+    outcome.digest = hashlib.sha256(
+        f"{station_digest(rig.inline.ask('stations')['stations'])}{rows}".encode()
+    ).hexdigest()
     outcome.alarms = sorted({code for code, _, _, standing in rows if standing})
     outcome.cleared = sorted({code for code, _, _, standing in rows if not standing})
     outcome.measurements = len(rig.inline.ask("measurements")["measurements"])

@@ -10,14 +10,14 @@ from typing import Any
 import msgpack
 
 from borechain.gauntlet.gauntlet_rig import GauntletRig
-from groundstation.service.answers.model import RigModel
+from groundstation.service.hole.surveyed_hole import SurveyedHole
 from sim.gauntlet.fault import TUBES
 from sim.gauntlet.faulty_world import TUBE_LENGTH, FaultyWorld
 from sim.rig.report import wrap_deg
 from telemetry.application.outbox import LIMIT
 from telemetry.messages import BASE, NodeFlag, Receipt, Side
-from telemetry.presentation.msgpack_codec import decode
-from telemetry.schema import Kind
+from telemetry.presentation.msgpack_codec import decode_message
+from telemetry.schema import MessageKind
 from telemetry.transport.hop import BEST_EFFORT_LIMIT, QUEUE_LIMIT, WINDOW, parse_frame
 
 DEPTH_TOLERANCE = 0.05  # m
@@ -31,7 +31,7 @@ TOLD = frozenset(
 )
 DEPTH = frozenset({"depth_refused", "depth_contradicts"})  # alarms while which no depth since a gap is sure
 YAW = frozenset({"reference", "joint"})  # alarms while which no yaw is sure, where encoder or sensors have failed
-RECEIPT = msgpack.packb({"k": int(Kind.RECEIPT)})[1:]  # in every frame with a receipt
+RECEIPT = msgpack.packb({"k": int(MessageKind.RECEIPT)})[1:]  # in every frame with a receipt
 UNKNOWN_DEG = 20.0  # of an azimuth whose yaws are all unknown, at least
 
 
@@ -67,7 +67,7 @@ class Observer:
         if sender != BASE or RECEIPT not in frame or (parsed := parse_frame(frame)) is None:
             return
         for _, payload in parsed[1]:
-            message = decode(payload)
+            message = decode_message(payload)
             if isinstance(message, Receipt):
                 known = (message.tube, message.sequence, message.content.hex())
                 if known not in self._stored():
@@ -121,14 +121,16 @@ class Observer:
         rig = self._rig
         if rig.ground is None or rig.stepper.is_frozen(BASE):
             return
-        model = rig.ground.model
+        string = rig.ground.model.string
+        states = string.states
         for tube in TUBES:
-            if model.age(tube) < 0.0:
+            if states.age(tube) < 0.0:
                 yield f"tube {tube} was heard in the future"
-            is_off = rig.silent_for(tube) > model.config.stale_after + LATE
-            if tube not in model.nodes or not (self._of_few or model.is_dated(model.nodes[tube])):
+            is_off = rig.silent_for(tube) > rig.ground.config.stale_after + LATE
+            state = states.newest.get(tube)
+            if state is None or not (self._of_few or string.time.is_dated(state)):
                 continue  # held up on its way, and of an epoch that this ground station has never heard
-            if is_off and not model.is_stale(tube):
+            if is_off and not states.is_stale(tube):
                 yield f"tube {tube} without power is shown fresh"
 
 
@@ -155,7 +157,7 @@ def find_violations(
         *_each_once(rows),
         *(() if standing & DEPTH or not depth_can_be_judged else _depths(rows, rig.world)),
         *(() if _is_told(rig.world, warned) or not encoder_can_be_judged else _directions(rig)),
-        *_flags(rig.inline.ground.model),
+        *_flags(rig.inline.ground.model.hole),
         *(_missing(rows, rig, standing | (told & {"depth_refused"})) if depth_can_be_judged else ()),
         *_health(rig.inline.ask("status")["health"], standing),
         *overlong_queues(rig),
@@ -208,15 +210,15 @@ def _directions(rig: GauntletRig) -> Iterator[str]:
             yield f"station at {station['md_m']:.2f} m is {size:.1f} sigmas from the truth"
 
 
-def _flags(model: RigModel) -> Iterator[str]:
+def _flags(hole: SurveyedHole) -> Iterator[str]:
     """Violations of the flags' effects: a faulty sensor's survey is not fused, an unknown yaw gives no azimuth."""
-    for station in model.stations:
-        for cluster in station.clusters:
-            if NodeFlag.SENSOR_FAULT in cluster.flags:
-                yield f"tube {cluster.tube}: a survey of a faulty sensor is fused"
-        counting = [station.clusters[place] for place in station.counting]
-        yaws = [cluster.fused_yaw_var for cluster in counting]
-        flagged = [NodeFlag.YAW_UNTRUSTED in cluster.flags for cluster in counting]
+    for station in hole.stations:
+        for stop in station.stops:
+            if NodeFlag.SENSOR_FAULT in stop.flags:
+                yield f"tube {stop.tube}: a survey of a faulty sensor is fused"
+        counting = [station.stops[place] for place in station.counting]
+        yaws = [stop.fused_yaw_var for stop in counting]
+        flagged = [NodeFlag.YAW_UNTRUSTED in stop.flags for stop in counting]
         if flagged and all(flagged) and min(yaws) < math.radians(UNKNOWN_DEG) ** 2:
             yield f"station at {station.md:.2f} m: untrusted yaws have a sigma of {math.sqrt(min(yaws)):.4f} rad"
         if any(flagged) and not all(flagged):
@@ -246,12 +248,13 @@ def _expected(rig: GauntletRig) -> list[tuple[int, float]]:
     depth is placed by the next.
     """
     stops = [(phase.tube, rig.world.true_depth(phase.end)) for phase in rig.world.phases if phase.kind == "stop"]
-    model = rig.inline.ground.model
-    due = model.config.survey_after + LATE
-    waits = [one.stand.md for one in model.stops if not one.judged and one.age(model.epoch, model.rig_now) < due]
+    ground = rig.inline.ground
+    string, waiting = ground.model.string, ground.model.placement.waiting
+    due, epoch = ground.config.survey_after + LATE, string.time.epoch
+    waits = [one.stand.md for one in string.stops if not one.judged and one.age(epoch, string.time.rig_now) < due]
     owed = _nodes([stop for stop in stops if not any(abs(stop[1] - md) <= DEPTH_TOLERANCE for md in waits)])
-    heard = max((stand.ended_at for stand in model.depths.stands if stand.epoch == model.epoch), default=math.inf)
-    late = {one.measurement.tube for one in model.waiting if one.measurement.station_at > heard}
+    heard = max((stand.ended_at for stand in string.depths.stands if stand.epoch == epoch), default=math.inf)
+    late = {one.message.tube for one in waiting if one.message.station_at > heard}
     coming = [one for one in _nodes([(max(late, default=0), rig.world.true_depth(rig.world.end))]) if one[0] in late]
     return [one for one in owed if not _is_among(one, coming)]
 

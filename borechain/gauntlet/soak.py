@@ -19,7 +19,7 @@ from sim.gauntlet.fault_kinds import KINDS
 from sim.gauntlet.faulty_disk import FaultyDisk
 from sim.gauntlet.faulty_world import COMMON, TUBE_LENGTH, FaultyWorld
 from sim.gauntlet.plan import drawn_kinds, steps_of
-from sim.world.streams import Stream, stream
+from sim.world.random_streams import RandomStream, random_stream
 from telemetry.messages import BASE
 
 MOST_STOPS = 1000
@@ -48,7 +48,7 @@ class SoakSample:
 def run_soak(hours: float, seed: int) -> Iterator[SoakSample]:
     """Drill and rest for ``hours`` of rig time under faults of a seed, and look at regular times."""
     world = FaultyWorld.of_tables(_tables(3600.0 * hours), seed)
-    disks = {address: FaultyDisk(stream(seed, Stream.GAUNTLET, 4, address)) for address in EVERYBODY}
+    disks = {address: FaultyDisk(random_stream(seed, RandomStream.GAUNTLET, 4, address)) for address in EVERYBODY}
     folder = Path(tempfile.mkdtemp(prefix="gauntlet-"))
     try:
         rig = GauntletRig(world, disks, {"tube_length": TUBE_LENGTH}, seed, folder)
@@ -96,7 +96,7 @@ def _sample(rig: GauntletRig, observer: Observer) -> SoakSample:
         disks_mib=sum(rig.disk(address).size for address in EVERYBODY) / 2**20,
         handles=len(list(Path("/proc/self/fd").iterdir())),
         database_kib=len(rig.disk(BASE).kept("ground.sqlite")) / 1024.0,
-        surveys=0 if model is None else sum(station.count for station in model.stations),
+        surveys=0 if model is None else sum(station.count for station in model.hole.stations),
         violations=tuple(observer.found),
         cpu_s=used.ru_utime,
     )

@@ -22,14 +22,14 @@ from telemetry.messages import (
     ENCODER,
     Event,
     ImuMean,
-    Mode,
     NodeFlag,
+    NodeMode,
     NodeState,
     Severity,
     Side,
     SurveyMeasurement,
 )
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.runtime.event_loop import run_event_loop
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.process_interface import Process
@@ -91,7 +91,7 @@ class Crowd(Process):
         if self._turn % max(self.tubes // 2, 1) == 0:
             depth = max(TUBE_LENGTH * self.tubes - ABOVE, 0.0)
             depth += self.speed * (number * DRILLING_S + min(into, DRILLING_S))
-            self._depth.put(encode(self._source.measure(now, depth)))
+            self._depth.put(encode_message(self._source.measure(now, depth)))
         if into >= DRILLING_S + SURVEYED_AFTER_S and self._surveyed_round <= number:
             self._surveyed_round = int(number) + 1
             for tube in range(1, self.tubes + 1):
@@ -102,7 +102,22 @@ class Crowd(Process):
 def state_of(tube: int, hops: int, now: float) -> NodeState:
     """State of a tube that tracks."""
     return NodeState(
-        tube, now, hops, Mode.TRACKING, 1.0, 1e-6, 1e-6, (0.0, 0.0, 0.0), 0.0, 0.0, 1e-6, 0.1, 1e-8, NodeFlag.NONE, 5, 0
+        tube,
+        now,
+        hops,
+        NodeMode.TRACKING,
+        1.0,
+        1e-6,
+        1e-6,
+        (0.0, 0.0, 0.0),
+        0.0,
+        0.0,
+        1e-6,
+        0.1,
+        1e-8,
+        NodeFlag.NONE,
+        5,
+        0,
     )
 
 

@@ -18,11 +18,12 @@ from borechain.load.patience import wait_for
 from borechain.load.readers import CONNECT_S, read_lines
 from groundstation.config import checked_config
 from groundstation.gateway.page.page_settings import PageSettings
-from groundstation.host import run_ground
-from groundstation.service.disk.ground_store import Store, Stored
+from groundstation.ground_host import run_ground
+from groundstation.service.disk.ground_store import Store
+from groundstation.service.string.stored import Stored
 from sim.errors import RigError
 from sim.rig.processes import ProcessTable, Spec
-from sim.rig.realtime import cpu_seconds, footprint, pids
+from sim.rig.realtime_run import cpu_seconds, memory_footprint, running_pids
 from telemetry.frozen import replace
 from telemetry.media.zenoh_bus import open_router
 from telemetry.messages import Stand, SurveyMeasurement
@@ -55,7 +56,7 @@ def measure_day(hours: float, tubes: int, endpoint: str, page: PageSettings, fol
             table.start(GROUND)
             ground = Ground(bus, RIG)
             moments = wait_for_history(ground)
-            started_s, started_cpu_s = time.monotonic() - begun, cpu_seconds(pids(table)[GROUND])
+            started_s, started_cpu_s = time.monotonic() - begun, cpu_seconds(running_pids(table)[GROUND])
             picture_s = first_picture(page)
             looked = [
                 answer_seconds(page, f"column?moment={number}")
@@ -70,7 +71,7 @@ def measure_day(hours: float, tubes: int, endpoint: str, page: PageSettings, fol
                 "picture_ms": round(1e3 * picture_s, ROUNDING),
                 "history_ms": round(1e3 * answer_seconds(page, "history"), ROUNDING),
                 "moment_ms": latency_quantiles(looked),
-                "private_mb": round(footprint(pids(table)[GROUND])["private_mb"], ROUNDING),
+                "private_mb": round(memory_footprint(running_pids(table)[GROUND])["private_mb"], ROUNDING),
             }
     finally:
         table.stop()

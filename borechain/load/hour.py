@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sim.rig.processes import ProcessTable
-from sim.rig.realtime import footprint, pids
+from sim.rig.realtime_run import memory_footprint, running_pids
 from telemetry.messages import SurveyMeasurement
-from telemetry.presentation.msgpack_codec import decode
+from telemetry.presentation.msgpack_codec import decode_message
 
 GROUND = "base"  # as the table of processes has it
 STOP_EVERY_S, STOP_S, FINISH_S = 90.0, 26.0, 30.0  # of rig time
@@ -83,10 +83,10 @@ class Scales:
             self.weights += self._weigh((now - self._begun) / 3600.0)
 
     def _weigh(self, hours: float) -> Iterator[Weight]:
-        for name, pid in sorted(pids(self._table).items()):
+        for name, pid in sorted(running_pids(self._table).items()):
             kept = self.kept() if name == GROUND else (0.0, 0)
             handles = len(list(Path(f"/proc/{pid}/fd").iterdir()))
-            yield Weight(hours, name, footprint(pid)["private_mb"], handles, *kept)
+            yield Weight(hours, name, memory_footprint(pid)["private_mb"], handles, *kept)
 
     def kept(self) -> tuple[float, int]:
         """Size of the database in kB, and surveys in it."""
@@ -100,6 +100,6 @@ class Scales:
                 return size / 1e3, 0
             rows = connection.execute("select payload from messages where kind = 'SurveyMeasurement'").fetchall()
         # one that was said again has the tube and the time of the first
-        said = (decode(payload) for (payload,) in rows)
+        said = (decode_message(payload) for (payload,) in rows)
         surveys = {(m.tube, m.station_at) for m in said if isinstance(m, SurveyMeasurement)}
         return size / 1e3, len(surveys)

@@ -14,7 +14,7 @@ from typing import Any
 from borechain.load.crowd import Crowd, crowd_in_thread
 from borechain.load.patience import wait_for
 from groundstation.config import checked_config
-from groundstation.host import run_ground
+from groundstation.ground_host import run_ground
 from groundstation.service.disk.ground_store import Store
 from sim.rig.processes import ProcessTable, Spec
 from telemetry.media.zenoh_bus import open_router
@@ -22,7 +22,7 @@ from telemetry.messages import ENCODER
 from telemetry.runtime.hosting import Place
 
 RIG = "killed"
-PRELOAD = "borechain.preload"
+PRELOAD = "borechain.drilling.preload"
 AT_ONCE = 8  # events that wait for their receipt
 MOST_RECEIPTS = 40  # of a life
 PATIENCE_S = 60.0

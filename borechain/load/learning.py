@@ -19,14 +19,14 @@ import numpy as np
 
 from borechain.load.crowd import ROUND_S, TUBE_LENGTH, state_of
 from borechain.load.day import ADVANCE, ADVANCES, BEGUN_AT, EPOCH, depth_of, surveys_at, up_to, write_day
-from borechain.recording.ground_replay import TapeClock
 from groundstation.config import GroundConfig, checked_config
-from groundstation.host import started
+from groundstation.ground_host import start_ground_process
+from groundstation.recording.ground_replay import TapeClock
 from sim.errors import RigError
 from telemetry.application.depth_source import DepthSource
 from telemetry.frozen import replace
 from telemetry.messages import SurveyMeasurement
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 
 RIG = "load"
 READINGS, READ_EVERY_S = 20, 2.0  # of the depth at a stop
@@ -79,7 +79,7 @@ class LearningLoad:
         self._questions = itertools.cycle(ASKED)
         self.taken: dict[str, list[float]] = defaultdict(list)  # s of CPU
         with self._timing("start"):
-            self.ground = started(config)
+            self.ground = start_ground_process(config)
         self.ground.clock = self._clock
 
     def drill(self, number: int, md: float) -> list[SurveyMeasurement]:
@@ -106,6 +106,11 @@ class LearningLoad:
             with self._timing("working out the hole then"):
                 self.ground.model.hole.settle()
 
+    def place_alone(self, survey: SurveyMeasurement, md: float) -> None:
+        """One comes by itself, and the hole is worked out after it."""
+        self._take([survey], md)
+        self.ground.model.hole.settle()
+
     def learn_asked(self, surveys: list[SurveyMeasurement], md: float) -> None:
         """Take surveys one by one with a query after each; the first query waits for the computed hole."""
         for survey in surveys:
@@ -130,7 +135,7 @@ class LearningLoad:
     def _read(self, md: float, after: float) -> None:
         self._now += after
         self._clock.rig_now = self._now
-        self.ground.on_depth(encode(self._source.measure(self._now, md)), self._now)
+        self.ground.on_depth(encode_message(self._source.measure(self._now, md)), self._now)
 
     @contextlib.contextmanager
     def _timing(self, what: str) -> Iterator[None]:
@@ -152,8 +157,8 @@ def measure_learning(surveys: int, tubes: int, stops: int, folder: Path) -> dict
     tenth, whole = (checked_config(rig=RIG, folder=folder / str(n), **settings) for n in (known // TENTH, known))
     sizes = [bytes_of_a_survey(config, n, tubes) for config, n in ((tenth, known // TENTH), (whole, known))]
     hearing = LearningLoad(whole, tubes, BEGUN_AT + ROUND_S * (known + 1))
-    model = hearing.ground.model
-    before = model.seen["measurements"]
+    hole = hearing.ground.model.hole
+    before = hole.newest
     with contextlib.closing(hearing.ground):
         courses = itertools.cycle((hearing.learn_together, hearing.learn_alone, hearing.learn_asked))
         learnt = 0
@@ -164,9 +169,9 @@ def measure_learning(surveys: int, tubes: int, stops: int, folder: Path) -> dict
                 hearing.ask_first()
             learn(taken, md)
             learnt += len(taken)
-        if model.seen["measurements"] != before + learnt:
-            raise RigError(f"{learnt} surveys came, {model.seen['measurements'] - before} were fused")
-        stations = len(model.stations)
+        if hole.newest != before + learnt:
+            raise RigError(f"{learnt} surveys came, {hole.newest - before} were fused")
+        stations = len(hole.stations)
     return {
         "surveys": before + learnt,
         "stations": stations,

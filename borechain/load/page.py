@@ -19,9 +19,9 @@ from borechain.load.crowd import DRILLING_S, ROUND_S, TUBE_LENGTH, Crowd, crowd_
 from borechain.load.patience import wait_for
 from borechain.load.readers import BARE, CONNECT_S, answer_nothing, follow_keys, follow_page
 from groundstation.gateway.page.page_settings import PageSettings
-from groundstation.host import run_ground
+from groundstation.ground_host import run_ground
 from sim.rig.processes import ProcessTable, Spec
-from sim.rig.realtime import cpu_seconds, footprint, pids
+from sim.rig.realtime_run import cpu_seconds, memory_footprint, running_pids
 from telemetry.media.zenoh_bus import ZenohBus, open_router
 from telemetry.runtime.hosting import Place
 
@@ -60,7 +60,7 @@ def measure_load(load: Load, endpoint: str, page: PageSettings, folder: Path) ->
     settings = {"tube_length": TUBE_LENGTH, "target": TUBE_LENGTH * load.tubes + SPARE_M}
     serve = partial(run_ground, own_clock=True, page=page)
     specs = {GROUND: Spec(serve, (Place(RIG, endpoint, folder / "ground"), settings))}
-    table = ProcessTable(specs, ["borechain.preload"])
+    table = ProcessTable(specs, ["borechain.drilling.preload"])
     try:
         table.warm()
         with open_router(endpoint) as bus:
@@ -137,7 +137,7 @@ def ask_until(ground: Ground, bus: ZenohBus, table: ProcessTable, until: float) 
     In turn with it a process is asked that does nothing else: where the machine lets that one wait too, the ground
     station is not to blame.
     """
-    pid = pids(table)[GROUND]
+    pid = running_pids(table)[GROUND]
     begun, cpu = time.monotonic(), cpu_seconds(pid)
     taken: list[float] = []
     bare: list[float] = []
@@ -146,7 +146,7 @@ def ask_until(ground: Ground, bus: ZenohBus, table: ProcessTable, until: float) 
     for path in itertools.cycle(ASKED):
         asked = time.monotonic()
         if asked >= begun + WEIGH_EVERY_S * len(weighed) or asked >= until:
-            weighed.append((round(asked - begun, ROUNDING), round(footprint(pid)["private_mb"], ROUNDING)))
+            weighed.append((round(asked - begun, ROUNDING), round(memory_footprint(pid)["private_mb"], ROUNDING)))
         if asked >= until:
             break
         asked = time.monotonic()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.calibration.errors import CalibrationError
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 

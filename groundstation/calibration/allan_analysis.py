@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.calibration.allan_fit import AllanFit, Estimate, fit_allan_variances
-from groundstation.calibration.errors import CalibrationError
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 AXES = "xyz"

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.calibration.coverage import COVERAGE, coverage_factor
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.jig import Combined, Jig, combined_uncertainty, settings_of
 from groundstation.survey.fusion.resolve import is_covariance
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 RANK_TOLERANCE = 1e-5  # of the largest singular value; below it a preset decides by its rounding

@@ -17,7 +17,6 @@ from zipfile import BadZipFile
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.laboratory_tables import (
     LARGEST,
     LaboratoryTable,
@@ -26,6 +25,7 @@ from groundstation.calibration.laboratory_tables import (
     read_bytes,
     read_table,
 )
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 AXES = ("x", "y", "z")

@@ -18,8 +18,8 @@ import numpy.typing as npt
 
 from groundstation.calibration.attitudes import AttitudeFit, fit_attitudes, true_vectors
 from groundstation.calibration.block import Calibration, Provenance
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.turntable import correct_readings
+from telemetry.errors import CalibrationError
 from telemetry.messages import StaticRecord
 
 Array = npt.NDArray[np.float64]

@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.calibration.coverage import COVERAGE
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.intervals import Spread, coverage_interval
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 UNREACHED = 1e-9  # of the jig's variance of all readings, below which it does not reach a direction

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.calibration.errors import CalibrationError
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 LARGEST = 1e30  # of a reading; no sensor reaches it, and its square is still a number

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.calibration import block
-from groundstation.calibration.errors import CalibrationError
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.mwd_model import ACCELEROMETER_AXES, LOCAL, MAGNETOMETER_AXES, Triad
 from groundstation.calibration.mwd_solve import MwdFit
+from telemetry.errors import CalibrationError
 
 FORMAT = 1
 SENSORS = {"mwd accelerometers": ACCELEROMETER_AXES, "mwd magnetometers": MAGNETOMETER_AXES}

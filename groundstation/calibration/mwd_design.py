@@ -11,11 +11,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.jig import Jig
 from groundstation.calibration.mwd_cost import AxisGeometry, Problem, parameter_layout
 from groundstation.calibration.mwd_model import volts_of
 from groundstation.calibration.mwd_record import TriadRecord
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 POOR_LEVERAGE = 6.0

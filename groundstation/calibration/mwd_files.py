@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.calibration.calibration_records import ANGLE_RATIO
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.laboratory_tables import LARGEST, LaboratoryTable, check_range, line_error, read_table
 from groundstation.calibration.mwd_model import gravity_inclination, nominal_triad, vectors_of_volts
 from groundstation.calibration.mwd_record import ACCELEROMETER_VOLTS_PER_G
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 HEADER = "tilt_deg,tool_face_deg,temperature_c,a_v,b_v,c_v"

@@ -11,9 +11,9 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.mwd_cost import Problem, Terms
 from groundstation.calibration.mwd_model import MAGNETOMETER_AXES
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 EPS = 1.5e-6  # stop rule (22)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.mwd_cost import SPAN, Problem
 from groundstation.calibration.mwd_model import (
     ACCELEROMETER_AXES,
@@ -19,6 +18,7 @@ from groundstation.calibration.mwd_model import (
     axis_signs,
     vertical_directions,
 )
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 ACCELEROMETER_VOLTS_PER_G = 3.0

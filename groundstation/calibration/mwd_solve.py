@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.jig import Jig
 from groundstation.calibration.mwd_cost import Problem
 from groundstation.calibration.mwd_design import (
@@ -42,6 +41,7 @@ from groundstation.calibration.mwd_record import (
     check_record,
     magnetometer_record,
 )
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 ONE_TEMPERATURE = 3.0  # C, span beyond which 12 parameters are too few

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.mwd_model import Readings, tool_face
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 TOOL_FACES = 12

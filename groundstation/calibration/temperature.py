@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.calibration.attitudes import least_squares, rank_of
-from groundstation.calibration.errors import CalibrationError
 from groundstation.survey.fusion.resolve import is_covariance
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 SHORTEST_SPAN = 10.0  # K; a slope from less is noise times a long lever

@@ -13,12 +13,13 @@ import msgpack
 import orjson
 
 from groundstation.errors import GroundError, SelectorError
-from groundstation.service.answers.answer_table import LONGEST_NUMBER, PATTERNS, find_answer
+from groundstation.service.answers.answer_table import ANSWERS, LONGEST_NUMBER, PATTERNS, find_answer
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.paths import AnsweredPath, answered_paths, check_parameters, find_path
+from groundstation.service.answers.revisions import BEATS
 from groundstation.service.answers.streamed_rows import Parameters
-from groundstation.service.orders.order_book import Order
-from groundstation.service.process.ground_process import BEATS, GroundProcess
+from groundstation.service.orders.order_book import SentOrder
+from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import BEGIN, Intake, pack_intake
 from telemetry import keys
 from telemetry.errors import TelemetryError
@@ -58,7 +59,9 @@ class ZenohGateway:
         self._late: dict[str, None] = {}  # paths of the hole that are to be put
         self._intake = bus.publisher(keys.INTAKE.format(rig=self._rig), MSGPACK, droppable=True)
         self._taped = 0  # newest event of the intake that was published, 0 without a listener
-        self._told = dict(process.model.seen)  # newest row of each stream that was published, or there before
+        self._told = {
+            one.path: process.model.newest_row(one.path) for one in ANSWERS.values() if one.is_stream
+        }  # newest row of each stream that was published, or there before
         process.listeners.append(self._publish)
         bus.queryable_kept(self._key("**"), partial(self._arrive, self._answer))
         bus.queryable_kept(keys.INTAKE.format(rig=self._rig), partial(self._arrive, self._answer_intake))
@@ -158,7 +161,7 @@ class ZenohGateway:
         model, found = self._process.model, find_path(self._process.model, path)
         if not found.is_stream:
             return found.json(model, {})
-        since, self._told[path] = self._told.get(path, 0), model.seen[path]
+        since, self._told[path] = self._told.get(path, 0), model.newest_row(path)
         return found.json(model, {"since": str(since)})
 
     def _answer(self, query: Query) -> None:
@@ -208,7 +211,7 @@ class ZenohGateway:
         self._awaited.add(task)
         task.add_done_callback(self._awaited.discard)
 
-    async def _reply_when_answered(self, query: Query, order: Order) -> None:
+    async def _reply_when_answered(self, query: Query, order: SentOrder) -> None:
         answered = asyncio.Event()
         order.when_answered(answered.set)
         name = order.spec.name

@@ -31,8 +31,9 @@ from groundstation.report.style import (
     styled,
     tidy_ticks,
 )
+from groundstation.survey.requests.survey_answer import SurveyAnswer
 from groundstation.survey.wall.column_deviation import ColumnDesign
-from groundstation.survey.well.ellipsoid import coverage_radius
+from groundstation.survey.well.ellipsoid import coverage_radius, probability_of
 
 Array = npt.NDArray[np.float64]
 
@@ -192,3 +193,11 @@ def _deviations(axes: Axes, md: Array, covs: Array) -> None:
     log_if_needed(axes, [scale * stds])
     axes.set(xlabel="Measured depth (m)", ylabel=f"Standard deviation ({unit})", title="Standard deviations")
     axes.legend()
+
+
+def draw_survey(answer: SurveyAnswer) -> Figure:
+    """Figure of a survey as it was asked for, its regions of uncertainty at the sigma of the answer."""
+    found, sigma = answer.found, answer.request.sigma
+    frame = f"{found.frame.answer} north, depth from {found.frame.depths.answer}"
+    title = f"{answer.request.file}, {answer.instrument}, {frame}, {sigma:g} sigma"
+    return survey_figure(found.md, found.positions, found.uncertainty.cov, probability_of(sigma, 2), title)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 
 import numpy as np
@@ -12,12 +13,17 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from groundstation.report.style import INK, MARKERS, SERIES, WRONG, new_figure, styled, tidy_ticks
+from telemetry.radio.link_request import PipeRequest, SoilRequest
+from telemetry.radio.path_loss import link_margin
+from telemetry.radio.soil_links import soil_power
 from telemetry.radio.steel import CARBON, TEMPERATURES, steel_resistivity
 from telemetry.radio.waveguide import LOWEST, TE11, cut_off, nepers_to_decibels, wall_attenuation
 
 Array = npt.NDArray[np.float64]
 LEVEL = 5.0  # dB, from one shade to the next
 FREQUENCIES = 400
+CURVE = 200  # points
+GRID = 41  # textures along a side of the map
 
 
 @styled
@@ -110,3 +116,38 @@ def pipe_figure(
         over_carbon.legend(loc="upper center", ncols=len(TEMPERATURES), columnspacing=1.0)
     over_carbon.set(xlabel="Carbon (% by weight)", ylabel="Attenuation (dB/m)")
     return tidy_ticks(figure)
+
+
+def draw_soil(request: SoilRequest) -> Figure:
+    """Received power over the distance, half as far to half as far again as was asked for."""
+    reach = np.linspace(0.5 * min(request.distances), 1.5 * max(request.distances), CURVE)
+    with warnings.catch_warnings():  # those of the model are told with the links themselves
+        warnings.simplefilter("ignore")
+        curves = {
+            f"{100.0 * water:g} % water": soil_power(request, request.sand, request.clay, water, reach)
+            for water in request.waters
+        }
+    texture = f"{100.0 * request.sand:g} % sand, {100.0 * request.clay:g} % clay"
+    return soil_curves(
+        reach, curves, request.threshold_dbm, f"Received power at {request.frequency_mhz:g} MHz, {texture}"
+    )
+
+
+def draw_soil_map(request: SoilRequest) -> Figure:
+    """Margin over all textures at the largest distance that was asked for."""
+    across, along = (side.ravel() for side in np.meshgrid(*2 * [np.linspace(0.0, 1.0, GRID)]))
+    kept = across + along <= 1.0 + 1e-9
+    across, along, far = across[kept], along[kept], max(request.distances)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        fields = {
+            water: link_margin(soil_power(request, across, along, water, far), request.threshold_dbm)
+            for water in request.waters
+        }
+    return soil_map(across, along, fields, f"Margin through {far:g} m of soil at {request.frequency_mhz:g} MHz")
+
+
+def draw_pipe(request: PipeRequest, rho: float) -> Figure:
+    """Attenuation inside the pipe that was asked for, of a steel of ``rho`` (ohm m)."""
+    title = f"Attenuation inside a pipe of {request.radius_cm:g} cm radius"
+    return pipe_figure(request.radius_cm * 1e-2, rho, request.frequency_ghz * 1e9, title)

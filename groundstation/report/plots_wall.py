@@ -31,8 +31,9 @@ from groundstation.report.style import (
 )
 from groundstation.survey.wall.as_built import Columns, ColumnState
 from groundstation.survey.wall.column_joint import joint_thickness
+from groundstation.survey.wall.wall_file import Wall
 from groundstation.survey.wall.wall_joints import ExtraColumn, Joints, pair_covariance, worst_joint
-from groundstation.survey.wall.wall_verdict import true_runs
+from groundstation.survey.wall.wall_verdict import Judgement, true_runs
 from groundstation.survey.well.ellipsoid import coverage_radius
 
 Array = npt.NDArray[np.float64]
@@ -340,3 +341,11 @@ def _legend(colour: str, extra: ExtraColumn | None) -> list[Any]:
         what = f"extra column, {extra.from_depth:.1f}–{extra.to_depth:.1f} m: {verdict}"
         handles.append(Line2D([], [], color=SERIES[1], ls="--", lw=1.5, label=what))
     return handles
+
+
+def draw_wall(wall: Wall, judgement: Judgement) -> Figure:
+    """Figure of a wall with its verdict, and the column that is proposed at its most doubtful joint."""
+    joint, _ = worst_joint(judgement.joints)
+    title = f"{wall.file.name}: {len(wall.pairs)} joints, {judgement.verdict.value}"
+    extra = dict(judgement.extras).get(joint)
+    return wall_figure(wall.built.columns, judgement.joints, wall.file.thickness, extra, title)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from datetime import date
 
 import numpy as np
 
+from groundstation.errors import SurveyError
 from groundstation.report.column_report import ColumnRecord, ReportSite, column_report, tolerance_text
-from groundstation.report.document import Document, Origin, ReportSection
+from groundstation.report.document import Document, Origin, ReportSection, report_pdf
 from groundstation.report.plots_wall import wall_figure
 from groundstation.report.style import svg_of
 from groundstation.survey.wall.as_built import ColumnState
@@ -251,3 +253,18 @@ def _names(names: list[str], order: list[str]) -> str:
             else:
                 runs.append([name])
     return ", ".join(f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(run) for run in runs)
+
+
+def wall_report_pdf(wall: Wall, judgement: Judgement, column: str | None, day: date, version: str) -> bytes:
+    """Report of the wall, or of one of its columns, as a document to be signed.
+
+    Raises
+    ------
+    SurveyError
+        When the wall has no such column.
+    """
+    names = [plan.design.name for plan in wall.plans]
+    if column is not None and column not in names:
+        raise SurveyError(f"--column: expected one of {', '.join(names)}, got {column}")
+    digests = [(f"SHA-256 of {name}", digest) for name, digest in wall.file.digests()]
+    return report_pdf(report_on(wall, judgement, column, Origin(day, version, digests)))

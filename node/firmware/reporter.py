@@ -18,8 +18,8 @@ from telemetry.messages import (
     Aiding,
     Event,
     ImuMean,
-    Mode,
     NodeFlag,
+    NodeMode,
     NodeState,
     Scalar,
     Severity,
@@ -31,7 +31,7 @@ SENSOR_FAULT, YAW_UNTRUSTED = int(NodeFlag.SENSOR_FAULT), int(NodeFlag.YAW_UNTRU
 AIDING_OLD, INNOVATION_REJECTED = int(NodeFlag.AIDING_OLD), int(NodeFlag.INNOVATION_REJECTED)
 RATE_EXCEEDED, RESTORED = int(NodeFlag.RATE_EXCEEDED), int(NodeFlag.RESTORED)
 CLOCK_UNSYNCHRONISED, BIAS_UNKNOWN = int(NodeFlag.CLOCK_UNSYNCHRONISED), int(NodeFlag.BIAS_UNKNOWN)
-STATIC_BIAS = int(Mode.STATIC_BIAS)
+STATIC_BIAS = int(NodeMode.STATIC_BIAS)
 VAR_FLOOR = (0.001 * DEG) ** 2
 VAR_CEILING = 100.0  # rad^2, the largest that a message says; a yaw of that variance is any yaw
 
@@ -198,11 +198,11 @@ class NodeReporter:
             alignment=(pitch, roll, float(mount["std"][0].max())),
         )
 
-    def _mode(self, *, aligning: bool) -> Mode:
+    def _mode(self, *, aligning: bool) -> NodeMode:
         """State of the node: what the kernels follow, unless a sensor fails or an alignment is under way."""
         if self._sensor_bits() & SENSOR_FAULT:
-            return Mode.FAULT
-        return Mode.ALIGNMENT if aligning else Mode(int(self._state["mode"]))
+            return NodeMode.FAULT
+        return NodeMode.ALIGNMENT if aligning else NodeMode(int(self._state["mode"]))
 
 
 def _sayable(variance: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,45 +11,49 @@ if TYPE_CHECKING:
     from telemetry.parameters import SensorParameters
 
 
-def imu_settings_of(
-    sources: int,
-    noises: tuple[float, ...],
-    offsets_mm: tuple[tuple[float, float], ...],
-    gyroscopes: tuple[Path, ...],
-    accelerometers: tuple[Path, ...],
-) -> tuple[ImuSettings, ...]:
-    """Settings of every IMU; an option that is absent leaves all of them as usual.
+@dataclass(frozen=True, slots=True)
+class ClusterRequest:
+    """The IMUs of a tube as its options say: each option for every IMU, or for none."""
 
-    Raises
-    ------
-    ConfigurationError
-        When options were given for different numbers of IMUs.
-    CalibrationError
-        When a file is not a calibration of its sensor.
-    """
-    from node.errors import NodeConfigurationError
-    from node.firmware.imu_settings import ImuSettings
+    sources: tuple[str, ...]
+    noises: tuple[float, ...]
+    offsets: tuple[tuple[float, float], ...]  # mm
+    gyroscopes: tuple[Path, ...]
+    accelerometers: tuple[Path, ...]
 
-    given = {
-        "imu": sources,
-        "imu-noise": len(noises),
-        "imu-offset-mm": len(offsets_mm),
-        "imu-gyroscope": len(gyroscopes),
-        "imu-accelerometer": len(accelerometers),
-    }
-    counts = {name: count for name, count in given.items() if count}
-    if len(set(counts.values())) > 1:
-        told = ", ".join(f"--{name} {count} times" for name, count in counts.items())
-        raise NodeConfigurationError(f"imus: expected as many of each option as there are IMUs, got {told}")
-    count = max(counts.values(), default=1)
-    rows = zip(
-        [(1e-3 * x, 1e-3 * y) for x, y in offsets_mm or ((0.0, 0.0),) * count],
-        noises or (1.0,) * count,
-        own_corrections("gyroscope", gyroscopes, count),
-        own_corrections("accelerometer", accelerometers, count),
-        strict=True,
-    )
-    return tuple(ImuSettings(*row) for row in rows)
+    def to_settings(self) -> tuple[ImuSettings, ...]:
+        """Settings of every IMU; an option that is absent leaves all of them as usual.
+
+        Raises
+        ------
+        NodeConfigurationError
+            When options were given for different numbers of IMUs.
+        CalibrationError
+            When a file is not a calibration of its sensor.
+        """
+        from node.errors import NodeConfigurationError
+        from node.firmware.imu_settings import ImuSettings
+
+        given = {
+            "imu": len(self.sources),
+            "imu-noise": len(self.noises),
+            "imu-offset-mm": len(self.offsets),
+            "imu-gyroscope": len(self.gyroscopes),
+            "imu-accelerometer": len(self.accelerometers),
+        }
+        counts = {name: count for name, count in given.items() if count}
+        if len(set(counts.values())) > 1:
+            told = ", ".join(f"--{name} {count} times" for name, count in counts.items())
+            raise NodeConfigurationError(f"imus: expected as many of each option as there are IMUs, got {told}")
+        count = max(counts.values(), default=1)
+        rows = zip(
+            [(1e-3 * x, 1e-3 * y) for x, y in self.offsets or ((0.0, 0.0),) * count],
+            self.noises or (1.0,) * count,
+            own_corrections("gyroscope", self.gyroscopes, count),
+            own_corrections("accelerometer", self.accelerometers, count),
+            strict=True,
+        )
+        return tuple(ImuSettings(*row) for row in rows)
 
 
 def own_corrections(sensor: str, files: tuple[Path, ...], count: int) -> list[SensorParameters]:

@@ -47,7 +47,7 @@ from telemetry.messages import (
     StaticRecord,
     SurveyMeasurement,
 )
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.joint_watch import JointFault
 from telemetry.runtime.process_interface import Process
@@ -300,7 +300,7 @@ class TubeProcess(Process):
     def _keep(self, said: Kept, now: float) -> None:
         """Keep a message for the ground station; surveys and records stay in the log when it has them."""
         if not isinstance(said, Event):
-            self._log.append_payload(said.sequence, encode(said))
+            self._log.append_payload(said.sequence, encode_message(said))
         self._saver.due = True
         if self._saver.spent:
             self.endpoint.mail.hold()

@@ -83,7 +83,7 @@ class Campaign:
         """The runs ``first``..``last``."""
         runs = [self.run(run) for run in range(first, last + 1)]
         surveys, epochs = zip(*runs, strict=True)
-        return Chunk(joined(surveys), joined(epochs))
+        return Chunk(join_columns(surveys), join_columns(epochs))
 
     def run(self, seed: int) -> tuple[Columns, Columns]:
         """Surveys and epochs of one run."""
@@ -129,7 +129,7 @@ class Campaign:
         }
 
 
-def joined(parts: tuple[Columns, ...]) -> Columns:
+def join_columns(parts: tuple[Columns, ...]) -> Columns:
     """Columns one below the other."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
+from sim.campaign.campaign_folder import code_digest
 from sim.campaign.chunk import Chunk, run_chunk
-from sim.campaign.store import code_digest
 from sim.errors import RigError
 from sim.one_thread import one_thread_each
 from sim.studies.pool import usable_cores
@@ -22,7 +22,7 @@ CONNECT_TIMEOUT: Final = 10.0  # s
 RETRIES: Final = 3  # of a chunk whose worker died
 
 
-def compute(scenario: bytes, ranges: Sequence[Range], engine: str, scheduler: str | None) -> Computed:
+def compute_chunks(scenario: bytes, ranges: Sequence[Range], engine: str, scheduler: str | None) -> Computed:
     """Chunks as they are done, in any order.
 
     Parameters
@@ -66,7 +66,7 @@ def on_dask(scenario: bytes, ranges: Sequence[Range], scheduler: str | None) -> 
     lost = (distributed.KilledWorker, distributed.CancelledError, OSError, TimeoutError)  # a closed line is an OSError
     as_completed: Callable[..., Any] = distributed.as_completed
 
-    with cluster(scheduler, len(ranges)) as client:
+    with connect_cluster(scheduler, len(ranges)) as client:
         check_code(client)
         futures = [client.submit(work_of, (scenario, *span), retries=RETRIES, pure=False) for span in ranges]
         try:
@@ -83,7 +83,7 @@ def on_dask(scenario: bytes, ranges: Sequence[Range], scheduler: str | None) -> 
 
 
 @contextmanager
-def cluster(scheduler: str | None, chunks: int) -> Iterator[Client]:
+def connect_cluster(scheduler: str | None, chunks: int) -> Iterator[Client]:
     """A client of a cluster that listens, or of one on this machine's loopback address."""
     import distributed
 

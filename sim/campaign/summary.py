@@ -112,14 +112,14 @@ class OverRuns:
 Groups = dict[Hashable, dict[str, OverRuns]]
 
 
-def groups() -> Groups:
+def empty_groups() -> Groups:
     """Quantities by group, made when they are first asked for."""
     return defaultdict(lambda: defaultdict(OverRuns))
 
 
-def honesty(chunks: Iterable[Columns]) -> list[dict[str, Any]]:
+def honesty_rows(chunks: Iterable[Columns]) -> list[dict[str, Any]]:
     """NEES and coverage at every hop, at rest and turning, of nodes that know their yaw."""
-    found: dict[Any, dict[str, OverRuns]] = groups()
+    found: dict[Any, dict[str, OverRuns]] = empty_groups()
     for epochs in chunks:
         random = wrap_angles(epochs["yaw_error"] - epochs["systematic_error"])
         total = epochs["yaw_error"] ** 2 / (epochs["yaw_var"] + epochs["systematic_var"])
@@ -148,9 +148,9 @@ def honesty(chunks: Iterable[Columns]) -> list[dict[str, Any]]:
     return [row for row in rows if row["count"]]
 
 
-def accuracy(chunks: Iterable[Columns]) -> list[dict[str, Any]]:
+def accuracy_rows(chunks: Iterable[Columns]) -> list[dict[str, Any]]:
     """Errors of the surveys at every depth, each node by itself; those whose yaw is not trusted are counted only."""
-    found: dict[Any, dict[str, OverRuns]] = groups()
+    found: dict[Any, dict[str, OverRuns]] = empty_groups()
     for surveys in chunks:
         depth = np.round(surveys["md"], 3)
         for md in np.unique(depth).tolist():

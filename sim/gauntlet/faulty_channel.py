@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from sim.rig.link_channel import LinkChannel
-from sim.world.streams import Stream, stream
+from sim.world.random_streams import RandomStream, random_stream
 from telemetry.messages import Side
 from telemetry.unwritten import Content
 
@@ -63,7 +63,9 @@ class FaultyChannel(LinkChannel):
     def _draw(self, port: Port) -> tuple[float, float, float]:
         random = self._draws.get(port)
         if random is None:
-            random = self._draws[port] = stream(self._seed_of_faults, Stream.GAUNTLET, 2, port[0], int(port[1]))
+            random = self._draws[port] = random_stream(
+                self._seed_of_faults, RandomStream.GAUNTLET, 2, port[0], int(port[1])
+            )
         fate, wait, begins = random.random(3).tolist()
         return fate, wait, begins
 

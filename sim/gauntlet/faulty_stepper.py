@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 
 from sim.gauntlet.faulty_disk import PowerCutError
 from sim.gauntlet.faulty_world import FaultyWorld
-from sim.rig.in_process import Build, InProcessStepper, step
-from sim.rig.scheduler import Progress
+from sim.rig.in_process import Build, InProcessStepper, step_process
+from sim.rig.scheduler import RigProgress
 from sim.rig.stepper import Answer, FrameEvent
 from telemetry.errors import BorechainError
 from telemetry.messages import BASE
@@ -49,7 +49,7 @@ class FaultyStepper(InProcessStepper):
         """Whether a process stands still, or has not moved since."""
         return address in self._frozen or address in self._thawing
 
-    def follow(self, progress: Progress) -> None:
+    def follow(self, progress: RigProgress) -> None:
         """Make what runs equal to what the schedule wants; the power may go at a start too."""
         for address in progress.kill:
             self.drop(address)
@@ -82,7 +82,7 @@ class FaultyStepper(InProcessStepper):
                 if address in self._frozen or address in self._thawing or address == BASE:
                     events = self._events_of(address, events)
                 if events and address in self.processes:
-                    answers[address] = step(self.processes[address], events)
+                    answers[address] = step_process(self.processes[address], events)
             except PowerCutError:
                 self._on_cut(address)
         return answers

@@ -9,8 +9,8 @@ import numpy as np
 
 from sim.gauntlet.fault import EVERYBODY, TUBES, Faulty, Step, draw_interval, drawn_tube
 from sim.gauntlet.power import delete_files
-from telemetry.messages import BASE, ENCODER, Aiding, Hello, Mode, Receipt, Side, TimeReply
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.messages import BASE, ENCODER, Aiding, Hello, NodeMode, Receipt, Side, TimeReply
+from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.transport.hop import HopLink, pack_frame, parse_frame
 
 REPEATS = 30
@@ -30,9 +30,9 @@ def forged_frames(rig: Faulty, random: np.random.Generator) -> None:
     """Send as a forged neighbour a hop count beyond every string, and receipts of messages that were not stored."""
     tube = drawn_tube(random)
     link = HopLink(ENCODER, int(random.integers(1, 1000)))
-    link.send_best_effort(encode(Hello(ENCODER, 7, int(random.integers(-1, 252)), Mode.BOOT, 1.0)), "hello")
+    link.send_best_effort(encode_message(Hello(ENCODER, 7, int(random.integers(-1, 252)), NodeMode.BOOT, 1.0)), "hello")
     for sequence in range(1, 9):
-        link.send_best_effort(encode(Receipt(tube, sequence, random.bytes(16))), sequence)
+        link.send_best_effort(encode_message(Receipt(tube, sequence, random.bytes(16))), sequence)
     _send(rig, link, tube, Side.UPPER)
 
 
@@ -41,9 +41,11 @@ def wild_numbers(rig: Faulty, random: np.random.Generator) -> None:
     tube = drawn_tube(random)
     link = HopLink(ENCODER, int(random.integers(1, 1000)))
     aiding = Aiding(0.0, 1e-12, 0.0, 0.0, 0.0, float(random.uniform(0.0, 1e6)), int(random.integers(2**40)), 0)
-    link.send_best_effort(encode(aiding), "aiding")
+    link.send_best_effort(encode_message(aiding), "aiding")
     asked = float(random.uniform(-1e6, 1e6))
-    link.send_best_effort(encode(TimeReply(asked, asked, asked, float(random.uniform(0.0, 1e9)), 1.0, 0.0)), "time")
+    link.send_best_effort(
+        encode_message(TimeReply(asked, asked, asked, float(random.uniform(0.0, 1e9)), 1.0, 0.0)), "time"
+    )
     _send(rig, link, tube, Side.UPPER)
 
 
@@ -68,7 +70,7 @@ def second_ground(random: np.random.Generator, begin: float, end: float) -> list
     link = HopLink(BASE, int(random.integers(1, 2**31)))
 
     def speak(rig: Faulty) -> None:
-        link.send_best_effort(encode(Hello(BASE, 1, -1, Mode.BOOT, 1.0)), "hello")
+        link.send_best_effort(encode_message(Hello(BASE, 1, -1, NodeMode.BOOT, 1.0)), "hello")
         _send(rig, link, ENCODER, Side.UPPER)
 
     return [Step(float(t), speak) for t in np.arange(at, until, 1.0)]

@@ -9,7 +9,7 @@ import numpy as np
 from sim.gauntlet.fault import Draw, Faulty, Step, draw_interval, drawn_tube, lasting_fault
 from sim.gauntlet.faulty_world import Reading
 from telemetry.messages import ENCODER, DepthReading
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 
 COUNTS = 4096  # of a turn
 
@@ -121,4 +121,6 @@ def depth_backwards(random: np.random.Generator, begin: float, end: float) -> li
 def depth_ahead(rig: Faulty, random: np.random.Generator) -> None:
     """Send a depth with a time in the future."""
     at = rig.world.local_clock(ENCODER, rig.now) + float(random.uniform(10.0, 1e4))
-    rig.send_depth(encode(DepthReading(int(random.integers(1, 10**6)), at, float(random.uniform(0.0, 10.0)), ())))
+    rig.send_depth(
+        encode_message(DepthReading(int(random.integers(1, 10**6)), at, float(random.uniform(0.0, 10.0)), ()))
+    )

@@ -22,7 +22,7 @@ from groundstation.calibration.mwd_model import (
 )
 from groundstation.calibration.quality import TOOL_FACES
 from sim.instruments.instrument import Records
-from sim.world.streams import JigStream, stream
+from sim.world.random_streams import JigStream, random_stream
 
 Array = npt.NDArray[np.float64]
 VOLTS_PER_G, VOLTS_PER_MICROTESLA = 3.0, 0.06
@@ -82,7 +82,7 @@ class MwdTool:
 
 def draw_tool(seed: int) -> MwdTool:
     """A tool within the figures of its sensors."""
-    random = stream(seed, JigStream.TOOL)
+    random = random_stream(seed, JigStream.TOOL)
     return MwdTool(
         _draw_triad(random, ACCELEROMETER_AXES, VOLTS_PER_G, 1.0),
         _draw_triad(random, MAGNETOMETER_AXES, VOLTS_PER_MICROTESLA, FIELD),
@@ -108,7 +108,7 @@ def _polynomials(random: np.random.Generator, bound: float, tempco: float) -> Ar
 
 def make_design(heating: Heating, seed: int = 0, tilts: int = 7) -> JigDesign:
     """Tilts 0..180 deg times tool faces, 12, or 24 while it heats; the jig's azimuth turns from tilt to tilt."""
-    random = stream(seed, JigStream.DESIGN)
+    random = random_stream(seed, JigStream.DESIGN)
     rounds = 5 if heating is Heating.SOAK else 1
     faces = 12 if heating in (Heating.ROOM, Heating.SOAK) else 24
     n = tilts * faces
@@ -131,7 +131,7 @@ def make_design(heating: Heating, seed: int = 0, tilts: int = 7) -> JigDesign:
 
 def fresh_design(seed: int, hot: bool, count: int = 400) -> JigDesign:
     """Attitudes uniform over the sphere, for a check of a calibration that has not seen them."""
-    random = stream(seed, JigStream.FRESH)
+    random = random_stream(seed, JigStream.FRESH)
     tilt = np.arccos(random.uniform(-1.0, 1.0, count))
     face, azimuth = random.uniform(0.0, 2.0 * np.pi, (2, count))
     temperature = random.uniform(COLDEST, HOTTEST, count) if hot else np.full(count, COLDEST)
@@ -160,7 +160,7 @@ def measure_tool(
     tool: MwdTool, design: JigDesign, seed: int, *, noise: float = NOISE, jig_std: float = JIG_STD
 ) -> JigRecord:
     """Readings of a tool; the jig stands a little beside its nominal attitudes."""
-    random = stream(seed, JigStream.READINGS)
+    random = random_stream(seed, JigStream.READINGS)
     n = len(design.tilt)
     wobble = jig_std * random.standard_normal((n, 3))
     turn = _rotation(0, wobble[:, 0]) @ _rotation(1, wobble[:, 1]) @ _rotation(2, wobble[:, 2])

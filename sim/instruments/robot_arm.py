@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from groundstation.calibration.calibration_records import ATTITUDES_HEADER, STANDARD_GRAVITY
 from sim.instruments.instrument import InstrumentError, Records
-from sim.world.streams import Stream, stream
+from sim.world.random_streams import RandomStream, random_stream
 
 Array = npt.NDArray[np.float64]
 PITCHES_DEG = (0.0, 30.0, -30.0, 0.0, 0.0, 60.0, -60.0, 0.0, 0.0, 45.0, -45.0, 0.0)
@@ -68,7 +68,7 @@ def robot_arm(
 
 def simulate_records(seed: int) -> Records:
     """Means of one accelerometer at twelve attitudes, m/s^2."""
-    random = stream(seed, Stream.ROBOT_ARM)
+    random = random_stream(seed, RandomStream.ROBOT_ARM)
     scale = np.eye(3) + MISALIGNMENT_STD * random.standard_normal((3, 3))
     np.fill_diagonal(scale, 1.0 + SCALE_STD * random.standard_normal(3))
     matrix, bias = STANDARD_GRAVITY * scale, BIAS_STD * random.standard_normal(3)

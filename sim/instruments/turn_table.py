@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from groundstation.calibration.calibration_records import AXES, TURN_TABLE_HEADERS
 from sim.instruments.instrument import Records
-from sim.world.streams import Stream, stream
+from sim.world.random_streams import RandomStream, random_stream
 
 Array = npt.NDArray[np.float64]
 REFERENCE_DPS = 720.0
@@ -40,7 +40,7 @@ def turn_table(
 
 def simulate_records(seed: int) -> Records:
     """Table of one gyroscope, deg/s."""
-    random = stream(seed, Stream.TURN_TABLE)
+    random = random_stream(seed, RandomStream.TURN_TABLE)
     matrix = np.eye(3) + MISALIGNMENT_STD * random.standard_normal((3, 3))
     np.fill_diagonal(matrix, 1.0 + SCALE_STD * random.standard_normal(3))
     bias = BIAS_STD_DPS * random.standard_normal(3)

@@ -10,12 +10,12 @@ import numpy as np
 
 from groundstation.calibration.field_calibration import force_inclination
 from groundstation.calibration.turntable import correct_readings
-from sim.rig.report import rms
+from sim.rig.report import root_mean_square
 from sim.world.world import World
 
 
-def calibration(view: dict[str, Any], measurements: Sequence[dict[str, Any]], world: World) -> dict[str, Any]:
-    """Part ``calibration`` of a rig's result; ``view`` is the ground station's ``recalibration``.
+def calibration_result(view: dict[str, Any], measurements: Sequence[dict[str, Any]], world: World) -> dict[str, Any]:
+    """Part ``calibration_result`` of a rig's result; ``view`` is the ground station's ``recalibration``.
 
     ``after`` is the inclination error of every survey below the collar; ``before`` that of the same surveys, each mean
     force led back to the reading, G = M f + b, and corrected by the block that the tube had before.
@@ -28,7 +28,7 @@ def calibration(view: dict[str, Any], measurements: Sequence[dict[str, Any]], wo
         before.append(_inclination_before(tubes.get(m["tube"]), m) - truth)
     return {
         "state": view["state"],
-        "inclination_rms_deg": {"before": rms(before), "after": rms(after)},
+        "inclination_rms_deg": {"before": root_mean_square(before), "after": root_mean_square(after)},
         "tubes": [_tube(row) for row in tubes.values()],
     }
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from sim.errors import RigError
-from sim.rig.scheduler import Progress
+from sim.rig.scheduler import RigProgress
 from sim.rig.stepper import Acted, Answer, FrameEvent
 from telemetry.messages import address_name
 from telemetry.runtime.process_interface import Process
@@ -41,7 +41,7 @@ class InProcessStepper:
         self._act_on_cue = act_on_cue
         self.processes: dict[int, Process] = {}
 
-    def follow(self, progress: Progress) -> None:
+    def follow(self, progress: RigProgress) -> None:
         """Make what runs equal to what the schedule wants."""
         for address in progress.kill:
             self.drop(address)
@@ -74,7 +74,7 @@ class InProcessStepper:
     def round(self, steps: Mapping[int, list[FrameEvent]]) -> dict[int, Answer]:
         """Step each process in turn; within a round none depends on another."""
         return {
-            address: step(self.processes[address], steps[address], self._carry)
+            address: step_process(self.processes[address], steps[address], self._carry)
             for address in sorted(steps)
             if address in self.processes
         }
@@ -85,12 +85,12 @@ class InProcessStepper:
         return self.builders[address]()
 
 
-def unwritten(frame: Content) -> Content:
+def carry_unwritten(frame: Content) -> Content:
     """Return a frame as the link hands it over: without need of its bytes none are made."""
     return frame
 
 
-def step(process: Process, events: list[FrameEvent], carry: Carry = bytes) -> Answer:
+def step_process(process: Process, events: list[FrameEvent], carry: Carry = bytes) -> Answer:
     """One step of one process: its events in order, and after each the frames that it sends."""
     frames: list[tuple[Sent, Content]] = []
     wake_at = run_step(process, events, lambda sent, frame: frames.append((sent, carry(frame.content))))

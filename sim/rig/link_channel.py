@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.world.streams import Stream, stream
+from sim.world.random_streams import RandomStream, random_stream
 from telemetry.messages import Side
 from telemetry.unwritten import Content
 
@@ -39,7 +39,7 @@ class LinkChannel:
         """Delay (s) and copy, for each copy of the next frame leaving this port; none when it is lost."""
         drawn = self._streams.get((sender, side))
         if drawn is None:
-            drawn = self._streams[sender, side] = PortStream(self._seed, Stream.LINK, sender, int(side))
+            drawn = self._streams[sender, side] = PortStream(self._seed, RandomStream.LINK, sender, int(side))
         fate, wait, again = drawn.draw()
         if fate < self.loss or (self.severed and (sender, side) in self.severed):
             self.lost += 1
@@ -56,9 +56,9 @@ class LinkChannel:
 class PortStream:
     """Draws of one port, made in blocks."""
 
-    def __init__(self, seed: int, purpose: Stream, *port: int) -> None:
-        self._random = stream(seed, purpose, *port)
-        self._damage = stream(seed, purpose, *port, DAMAGE)
+    def __init__(self, seed: int, purpose: RandomStream, *port: int) -> None:
+        self._random = random_stream(seed, purpose, *port)
+        self._damage = random_stream(seed, purpose, *port, DAMAGE)
         self._block: list[tuple[float, float, float]] = []
 
     def draw(self) -> tuple[float, float, float]:

@@ -51,7 +51,7 @@ class ProcessTable:
 
     def warm(self) -> None:
         """Start the fork server and wait until it has imported everything."""
-        process = self._context.Process(target=nothing)
+        process = self._context.Process(target=do_nothing)
         process.start()
         process.join()
 
@@ -108,5 +108,5 @@ class ProcessTable:
             )
 
 
-def nothing() -> None:
+def do_nothing() -> None:
     """What the first process forked does."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from sim.rig.link_channel import PortStream
 from sim.world.radio import RadioLinks
-from sim.world.streams import Stream
+from sim.world.random_streams import RandomStream
 from telemetry.messages import Side
 
 
@@ -47,10 +47,10 @@ class RadioChannel:
         pair = sender, side, hearer
         drawn = self._streams.get(pair)
         if drawn is None:
-            drawn = self._streams[pair] = PortStream(self._seed, Stream.RADIO, sender, int(side), hearer)
+            drawn = self._streams[pair] = PortStream(self._seed, RandomStream.RADIO, sender, int(side), hearer)
         fate, wait, again = drawn.draw()
         heard_with = self._links.margin(joints, at)
-        failed = failures(fate, self._links.error_rate(heard_with))
+        failed = failed_attempts(fate, self._links.error_rate(heard_with))
         if failed >= self._attempts:
             self.lost += 1
             return []
@@ -61,7 +61,7 @@ class RadioChannel:
         return [(delay, drawn.damage(frame, self._corrupt), heard_with) for delay in delays]
 
 
-def failures(fate: float, error_rate: float) -> float:
+def failed_attempts(fate: float, error_rate: float) -> float:
     """Attempts that fail before the first that does not, of a uniform ``fate``: ``P(k or more) = error_rate^k``."""
     if error_rate <= 0.0 or fate >= error_rate:
         return 0

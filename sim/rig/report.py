@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.world.motion import Phase
+from sim.world.motion import SchedulePhase
 from sim.world.world import World
 
 STATION_KEYS = (
@@ -40,7 +40,7 @@ def wrap_deg(angle_deg: float) -> float:
     return 180.0 - (180.0 - angle_deg) % 360.0
 
 
-def rms(values: Sequence[float]) -> float | None:
+def root_mean_square(values: Sequence[float]) -> float | None:
     """Root mean square, None of nothing."""
     return float(np.sqrt(np.mean(np.square(values)))) if len(values) else None
 
@@ -79,34 +79,40 @@ def missing_surveys(measurements: Sequence[dict[str, Any]], world: World) -> lis
     return missing
 
 
-def stops_of(world: World) -> list[tuple[Phase, float]]:
+def stops_of(world: World) -> list[tuple[SchedulePhase, float]]:
     """Stops of the schedule, each with the rig time (s) until which the string stands."""
     drills = [phase.start for phase in world.phases if phase.kind == "drill"]
     stops = [phase for phase in world.phases if phase.kind == "stop"]
     return [(stop, min((at for at in drills if at >= stop.end), default=world.end)) for stop in stops]
 
 
-def figures(stations: Sequence[dict[str, Any]], measurements: Sequence[dict[str, Any]], world: World) -> dict[str, Any]:
+def figures_of_merit(
+    stations: Sequence[dict[str, Any]], measurements: Sequence[dict[str, Any]], world: World
+) -> dict[str, Any]:
     """Figures of merit of one run; degrees and metres."""
     leaning = [s for s in stations if s["truth"]["inclination_deg"] > AZIMUTH_FROM_INCLINATION_DEG]
     errors = yaw_errors(measurements, world)
     hops = sorted({row[0] for row in errors})
     toe = stations[-1] if stations else None
     return {
-        "azimuth_rms_deg": rms([wrap_deg(s["azimuth_deg"] - s["truth"]["azimuth_deg"]) for s in leaning]),
-        "inclination_rms_deg": rms([s["inclination_deg"] - s["truth"]["inclination_deg"] for s in stations]),
-        "toe_error_m": None if toe is None else math.dist(position(toe), position(toe["truth"])),
-        "yaw_rms_deg_by_hop": [rms([math.degrees(row[1]) for row in errors if row[0] == hop]) for hop in hops],
+        "azimuth_rms_deg": root_mean_square([wrap_deg(s["azimuth_deg"] - s["truth"]["azimuth_deg"]) for s in leaning]),
+        "inclination_rms_deg": root_mean_square(
+            [s["inclination_deg"] - s["truth"]["inclination_deg"] for s in stations]
+        ),
+        "toe_error_m": None if toe is None else math.dist(station_position(toe), station_position(toe["truth"])),
+        "yaw_rms_deg_by_hop": [
+            root_mean_square([math.degrees(row[1]) for row in errors if row[0] == hop]) for hop in hops
+        ],
         "nees_by_hop": [float(np.mean([row[2] for row in errors if row[0] == hop])) for hop in hops],
     }
 
 
-def position(station: dict[str, Any]) -> tuple[float, float, float]:
+def station_position(station: dict[str, Any]) -> tuple[float, float, float]:
     """North, east and true vertical depth, m."""
     return station["north_m"], station["east_m"], station["tvd_m"]
 
 
-def digest(stations: Sequence[dict[str, Any]]) -> str:
+def station_digest(stations: Sequence[dict[str, Any]]) -> str:
     """SHA-256 of the station table as measured, every bit of every number."""
     exact = [[float(s[key]).hex() for key in STATION_KEYS] for s in stations]
     return hashlib.sha256(json.dumps(exact).encode()).hexdigest()

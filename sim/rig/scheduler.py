@@ -24,11 +24,11 @@ from sim.errors import RigError
 from sim.rig.link_channel import LinkChannel
 from sim.rig.radio_channel import RadioChannel
 from sim.rig.stepper import Acted, Answer, FrameEvent, Stepper
-from sim.world.motion import Phase
+from sim.world.motion import SchedulePhase
 from sim.world.world import World
 from telemetry.application.depth_source import DepthSource
 from telemetry.messages import BASE, ENCODER, Side, address_name
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.runtime.stepped import Due, DueEvent
 from telemetry.unwritten import Content
 
@@ -44,7 +44,7 @@ Entry = tuple[float, int, int, int, "Due | None", Content, "float | None"]
 
 
 @dataclass(slots=True)
-class Progress:
+class RigProgress:
     """What the rig is doing, for display."""
 
     phase: str
@@ -87,7 +87,7 @@ class Scheduler:
         self,
         world: World,
         stepper: Stepper,
-        tell: Callable[[Progress], None],
+        tell: Callable[[RigProgress], None],
         speed: float = math.inf,
         *,
         cued: bool = False,
@@ -109,7 +109,7 @@ class Scheduler:
             self._radio = RadioChannel(
                 world.radio, world.seed, medium.latency, medium.jitter, medium.duplicate, medium.corrupt
             )
-        self.progress = Progress("starting", world.begin, world.begin, world.end, [ENCODER, BASE])
+        self.progress = RigProgress("starting", world.begin, world.begin, world.end, [ENCODER, BASE])
         self._depth = DepthSource()
         self._seal_depth = seal_depth
         self._queue: list[Entry] = []
@@ -201,7 +201,7 @@ class Scheduler:
         # at one time the rack is left before the first tube is added
         return sorted(changes, key=lambda change: (change.at, change.apply != self._leave_rack))
 
-    def _enter(self, phase: Phase) -> None:
+    def _enter(self, phase: SchedulePhase) -> None:
         self.progress.phase = f"{phase.kind} tube {phase.tube}"
         if phase.kind == "add":
             self._join(self._string, open_top=True)
@@ -333,7 +333,7 @@ class Scheduler:
     ) -> None:
         if at >= self.world.motion.begin:  # in the rack there is no bit
             rig_time = self.world.local_clock(ENCODER, at)
-            depth = encode(self._depth.measure(rig_time, max(self.world.bit_depth(at), 0.0)))
+            depth = encode_message(self._depth.measure(rig_time, max(self.world.bit_depth(at), 0.0)))
             self._add(steps, true_time, BASE, Due.DEPTH, at, self._seal_depth(depth), b"")
         self._add(steps, true_time, BASE, Due.TIMER, at, None, b"")
         for address in self.stepper.alive():

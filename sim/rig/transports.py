@@ -52,7 +52,7 @@ class Transports:
 
 
 @contextmanager
-def carrying(chosen: str | None, otherwise: Sequence[Transport]) -> Iterator[Transports]:
+def open_transports(chosen: str | None, otherwise: Sequence[Transport]) -> Iterator[Transports]:
     """Transports of a rig: the choice of its operator or else of its scenario, with the hub that they need."""
     turn = CHOICES[chosen] if chosen is not None else tuple(otherwise)
     transports = Transports(turn)

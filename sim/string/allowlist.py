@@ -12,7 +12,7 @@ from typing import Any, Final
 from pydantic import BaseModel
 
 from sim.errors import ScenarioError
-from sim.world.disturbance.table import TABLE
+from sim.world.disturbance.disturbance_table import TABLE
 from sim.world.scenario import Scenario
 
 EXPRESSED: Final[dict[str, tuple[str, ...]]] = {  # by the part of a string that does

@@ -25,7 +25,7 @@ from sim.string.drill import drill_string, hand_down, new_memory, no_estimates
 from sim.string.head_measurements import measure_head, row_of_aiding
 from sim.string.hops import HOP
 from sim.string.nodes import NEVER, loop_of, new_nodes, tuned_config
-from sim.string.readings import record_readings
+from sim.string.reading_suppliers import record_readings
 from sim.string.result import NodeTrace, StringRun, StringSurvey, wrap_angles
 from sim.string.schedule import StringSchedule, schedule_of
 from sim.world.world import World

@@ -19,7 +19,7 @@ from sim.string.drill import drill_string, new_memory
 from sim.string.head_measurements import measure_head
 from sim.string.hops import draw_hops, hop_noise_of
 from sim.string.nodes import loop_of, new_nodes
-from sim.string.readings import DrawnReadings, felt_by, new_readings
+from sim.string.reading_suppliers import DrawnReadings, felt_by, new_readings
 from sim.string.result import LOGGED_STATE, LOGGED_SURVEY, StationLog, wrap_angles
 from sim.string.rough_runs import FieldRun, RoughWorld
 from sim.string.schedule import StringSchedule, redraw_schedule, schedule_of

@@ -29,7 +29,7 @@ from node.kernels.record.node_record import (
 )
 from node.kernels.step.node_step import ONWARD
 from sim.kernel import kernel, shared_body
-from sim.string.readings import supply_readings
+from sim.string.reading_suppliers import supply_readings
 from sim.string.result import LOGGED, log_epoch, log_node, trace_node
 
 
@@ -89,7 +89,7 @@ def drill_string(
     hops : (tubes,) of dtype ``sim.string.hops.HOP``
     shifts : (tubes,) s, of the nodes' clocks
     memory : ``CycleMemory``
-    recorded, drawn, field : see ``sim.string.readings.supply_readings``
+    recorded, drawn, field : see ``sim.string.reading_suppliers.supply_readings``
     estimates : ``SaidEstimates``; None where nodes hand on what came
     trace, log : ``NodeTrace`` and ``StationLog`` of ``sim.string.result``
     """

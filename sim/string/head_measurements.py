@@ -87,17 +87,17 @@ def measure_samples(world: World, samples: Array, edges_before: Callable[[int], 
     rows = np.zeros((len(samples), AIDING))
     torque = world.torque_settings()
     measure_cycles(new_encoder(0, torque.drilling), drive_record(torque), samples, rows)
-    return renumbered(world, rows)
+    return renumber_measurements(world, rows)
 
 
 def measure_counts(world: World, encoder: PlainEncoder) -> Array:
     """What an encoder without times of its edges measures, (cycles, AIDING)."""
     heads = world.motion.drive(world.ends)[0].tolist()
     measured = [encoder.on_cycle(head, end) for head, end in zip(heads, world.ends.tolist(), strict=True)]
-    return renumbered(world, np.array([row_of_aiding(aiding) for aiding in measured]))
+    return renumber_measurements(world, np.array([row_of_aiding(aiding) for aiding in measured]))
 
 
-def renumbered(world: World, rows: Array) -> Array:
+def renumber_measurements(world: World, rows: Array) -> Array:
     """Measurements (cycles, AIDING), each with a number of its own where the scenario has it so."""
     if world.scenario.file.aiding.renumbered:
         rows[:, A_SEQUENCE] = np.arange(len(rows))

@@ -14,8 +14,8 @@ import numpy.typing as npt
 from node.kernels.arithmetic.formats import PERIOD, Array
 from sim.kernel import kernel
 from sim.world.disturbance.wander import gauss_markov
+from sim.world.random_streams import RandomStream, random_stream
 from sim.world.scenario_file import ScenarioFile
-from sim.world.streams import Stream, stream
 from sim.world.world import World
 
 HOP: Final = np.dtype(
@@ -41,18 +41,18 @@ HOP_NOISE: Final = np.dtype(
 def record_hops(world: World) -> tuple[Array, npt.NDArray[np.bool_]]:
     """Error of rig time below each joint (cycles, hops) s, and whether an aiding is lost there (cycles, hops)."""
     file, shape = world.scenario.file, (world.cycles, world.scenario.tubes)
-    clocks, random = file.clocks, stream(world.seed, Stream.AIDING_CLOCKS)
+    clocks, random = file.clocks, random_stream(world.seed, RandomStream.AIDING_CLOCKS)
     constant = 1e-3 * clocks.joint_std_ms * random.standard_normal(shape[1])
     std = np.full(3, 1e-3 * clocks.wander_std_ms)
     wander = [gauss_markov(random, shape[0], std, clocks.wander_tau_s, PERIOD)[:, 0] for _ in range(shape[1])]
-    losses = stream(world.seed, Stream.AIDING_LOSS).random(shape) < file.medium.loss
+    losses = random_stream(world.seed, RandomStream.AIDING_LOSS).random(shape) < file.medium.loss
     return np.cumsum(constant + np.stack(wander, axis=1), axis=1), np.asarray(losses)
 
 
 def draw_hops(world: World) -> Array:
     """Hops of a world before the first cycle, (tubes,) of dtype ``HOP``; what changes is drawn cycle by cycle."""
     hops = np.zeros(world.scenario.tubes, HOP)
-    drawn = stream(world.seed, Stream.AIDING_CLOCKS).standard_normal(len(hops))
+    drawn = random_stream(world.seed, RandomStream.AIDING_CLOCKS).standard_normal(len(hops))
     hops["clock"] = 1e-3 * world.scenario.file.clocks.joint_std_ms * drawn
     return hops
 

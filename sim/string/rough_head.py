@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from node.kernels.string.encoder_step import COUNT, EDGE_AT, NOW, RISING, SAMPLE, TIMED
 from sim.string.head_measurements import measure_samples
+from sim.world.random_streams import RandomStream, random_stream
 from sim.world.rough_disc import RoughDisc
 from sim.world.rough_section import RoughEncoderSection
-from sim.world.streams import Stream, stream
 from sim.world.world import World
 
 Array = npt.NDArray[np.float64]
@@ -32,12 +32,12 @@ def measured_in_field(world: World, section: RoughEncoderSection, t: Array, head
     samples = np.zeros((len(ends), SAMPLE))
     samples[:, NOW], samples[:, TIMED] = ends, 1.0
     samples[:, [COUNT, EDGE_AT, RISING]] = disc.samples(ends)
-    samples[:, COUNT] += outliers(section, len(ends), math.tau / len(world.disc.errors), seed)
+    samples[:, COUNT] += outlier_counts(section, len(ends), math.tau / len(world.disc.errors), seed)
     return measure_samples(world, samples, lambda cycle: disc.sample(float(ends[cycle]))[3])
 
 
-def outliers(section: RoughEncoderSection, cycles: int, quantum: float, seed: int) -> Array:
+def outlier_counts(section: RoughEncoderSection, cycles: int, quantum: float, seed: int) -> Array:
     """Counts (cycles,) of ``quantum`` rad by which the readings are off."""
-    random = stream(seed, Stream.ROUGH_OUTLIERS)
+    random = random_stream(seed, RandomStream.ROUGH_OUTLIERS)
     off = random.random(cycles) < section.outliers
     return np.asarray(off * np.rint(math.radians(section.outlier_deg) / quantum * random.standard_normal(cycles)))

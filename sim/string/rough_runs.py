@@ -15,12 +15,12 @@ from node.kernels.arithmetic.formats import Array
 from sim.string.moving_string import MovingString
 from sim.string.rough_head import measured_in_field
 from sim.world.disturbance.frame_layout import FINER
-from sim.world.disturbance.frame_sums import FIFO, Field, StillString
+from sim.world.disturbance.frame_sums import FIFO, FrameField, StillString
 from sim.world.disturbance.frame_times import PLACES, find_frames
 from sim.world.disturbance.frame_vibration import Vibration, frames_drawn
+from sim.world.random_streams import RandomStream, random_stream
 from sim.world.rough_motion import MARGIN
 from sim.world.rough_section import RoughSection
-from sim.world.streams import Stream, stream
 from sim.world.world import World
 
 Counts = npt.NDArray[np.int64]
@@ -29,7 +29,7 @@ Counts = npt.NDArray[np.int64]
 class FieldRun(NamedTuple):
     """A rough world in one run."""
 
-    field: Field
+    field: FrameField
     measured: Array  # (cycles, AIDING) what the encoder said
     string: Array  # (n,) rad, on the grid of the motion, what the string has turned
     shaken: Array  # (cycles, tubes) rad, angle of each tube's torsional vibration at the end of its cycle
@@ -59,7 +59,7 @@ class RoughWorld:
         moving = self._string
         tubes = range(1, world.scenario.tubes + 1)
         phases = np.array([world.phase(tube) for tube in tubes])
-        random = stream(world.seed, Stream.ROUGH_VIBRATION)
+        random = random_stream(world.seed, RandomStream.ROUGH_VIBRATION)
         torsional, shaken = self._vibration.drawn(random)
         string = moving.string(world.seed)
         field = self._field._replace(
@@ -89,7 +89,7 @@ class RoughWorld:
         """Where every tube's frames lie among its reads, (tubes,) of dtype ``FIFO``."""
         fifos = np.zeros(len(phases), FIFO)
         for number, (fifo, phase) in enumerate(zip(fifos, phases.tolist(), strict=True), 1):
-            of_frames = float(stream(seed, Stream.ROUGH_FRAMES, number).random())
+            of_frames = float(random_stream(seed, RandomStream.ROUGH_FRAMES, number).random())
             before = (MARGIN + phase) / self._frame
             whole = math.floor(before - of_frames)
             fifo["place"] = place = math.floor((before - of_frames - whole) * PLACES)

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from node.kernels.arithmetic.formats import PERIOD
+from sim.world.random_streams import RandomStream, random_stream
 from sim.world.scenario_file import AidingSection
-from sim.world.streams import Stream, stream
 from sim.world.world import World
 
 Array = npt.NDArray[np.float64]
@@ -115,7 +115,7 @@ def aiding_passes(section: AidingSection, t: Array, seed: int) -> Mask:
     """Whether the encoder is heard in each cycle that ends at ``t`` (cycles,) s. Source: update modes, thesis 4.2."""
     every = section.every_s
     repeats = section.on_s + section.off_s if every is None else every
-    shifted = t + repeats * float(stream(seed, Stream.AIDING_PHASE).random())
+    shifted = t + repeats * float(random_stream(seed, RandomStream.AIDING_PHASE).random())
     if every is None:
         return np.asarray(np.mod(shifted, repeats) < section.on_s)
     number = np.floor(shifted / every + 1e-9)  # the first cycle of every interval

@@ -15,12 +15,12 @@ import numpy.typing as npt
 from node.kernels.arithmetic.formats import PERIOD
 from sim.world.disc import Disc
 from sim.world.marks import Marks
-from sim.world.motion import Motion, Phase, Trapezoid
+from sim.world.motion import Motion, SchedulePhase, Trapezoid
 from sim.world.rack import Rack
+from sim.world.random_streams import RandomStream, random_stream
 from sim.world.rough_run import RoughRun
 from sim.world.rough_truth import RoughTruth
 from sim.world.scenario import Scenario
-from sim.world.streams import Stream, stream
 from sim.world.torsion import StringTorsion
 from sim.world.truth import TubeTruth
 
@@ -41,19 +41,19 @@ class DrillString:
         self.scenario = scenario
         self.seed = seed
         file = scenario.file
-        self.first_angle = float(stream(seed, Stream.DRIVE, 0).uniform(0.0, 2.0 * math.pi))
+        self.first_angle = float(random_stream(seed, RandomStream.DRIVE, 0).uniform(0.0, 2.0 * math.pi))
         self.begin = file.schedule.begin_s
         self.rack = None if file.calibration is None else Rack(file.calibration, self.begin)
         self.motion = self._motion(self.begin if self.rack is None else self.rack.end)
         self.marks = Marks(scenario, seed, self.motion)
         self.torsion = self._string_torsion()
-        self.phases: tuple[Phase, ...] = self.motion.phases
+        self.phases: tuple[SchedulePhase, ...] = self.motion.phases
         self.end = self.motion.end
         self._rough_truths: dict[int, RoughTruth] = {}
         turns_free = bool(file.joints.head_turn_deg)
         free_at = (self.marks.made_up - FREE_BEFORE).tolist() if turns_free else []
         free_by = self.marks.free_turns.tolist() if turns_free else []
-        edge_std, lines = math.radians(file.encoder.edge_std_deg), stream(seed, Stream.DISC, 0)
+        edge_std, lines = math.radians(file.encoder.edge_std_deg), random_stream(seed, RandomStream.DISC, 0)
         self.disc = Disc(self.motion, file.encoder.counts_per_turn, edge_std, lines, free_at, free_by)
 
     @property
@@ -160,11 +160,13 @@ class DrillString:
         if section is None:
             return None
         lengths = self.motion.lengths.astype(float)
-        trapped = section.trapped_fraction * np.abs(stream(self.seed, Stream.TORSION, 0).standard_normal(len(lengths)))
+        trapped = section.trapped_fraction * np.abs(
+            random_stream(self.seed, RandomStream.TORSION, 0).standard_normal(len(lengths))
+        )
         return StringTorsion(section, self.motion, self.scenario.tube_length, lengths, trapped)
 
     @cached_property
     def _phases(self) -> list[float]:
-        draws = PERIOD * stream(self.seed, Stream.PHASES, 0).random(self.scenario.tubes + 1)
+        draws = PERIOD * random_stream(self.seed, RandomStream.PHASES, 0).random(self.scenario.tubes + 1)
         locked = self.scenario.file.encoder.phase == "locked"
         return [0.0] * len(draws) if locked else draws.tolist()

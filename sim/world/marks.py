@@ -10,13 +10,13 @@ import numpy.typing as npt
 
 from node.firmware.tube_settings import MakeUpAngle, PassedTube
 from sim.world.motion import Motion
+from sim.world.random_streams import RandomStream, random_stream
 from sim.world.scenario import Scenario
-from sim.world.streams import Stream, stream
 
 Array = npt.NDArray[np.float64]
 
 
-def wrap(angle: float) -> float:
+def wrap_angle(angle: float) -> float:
     """Angle (rad) in (-pi, pi]."""
     return math.pi - (math.pi - angle) % (2.0 * math.pi)
 
@@ -44,8 +44,8 @@ class Marks:
         drive_error, lower_error = self._joint_errors
         misread = self._misread(tube)
         return PassedTube(
-            MakeUpAngle(wrap(drive[tube] - self._turned_before(tube) + drive_error[tube] + misread), std),
-            MakeUpAngle(wrap(lower[tube] + lower_error[tube]), std),
+            MakeUpAngle(wrap_angle(drive[tube] - self._turned_before(tube) + drive_error[tube] + misread), std),
+            MakeUpAngle(wrap_angle(lower[tube] + lower_error[tube]), std),
         )
 
     def errors(self, tube: int) -> Array:
@@ -71,20 +71,22 @@ class Marks:
     def mounts(self) -> list[float]:
         """By how much the IMU of each tube is off its mark about the axis, rad."""
         std = math.radians(self._section.mount_std_deg)
-        errors: list[float] = (std * stream(self._seed, Stream.MOUNTS, 0).standard_normal(self._tubes + 1)).tolist()
+        errors: list[float] = (
+            std * random_stream(self._seed, RandomStream.MOUNTS, 0).standard_normal(self._tubes + 1)
+        ).tolist()
         return errors
 
     @cached_property
     def free_turns(self) -> Array:
         """What the head turns, free of the string, before each make-up, rad."""
         size = math.radians(self._section.head_turn_deg)
-        return np.asarray(size * stream(self._seed, Stream.SLIPS, 1).uniform(0.5, 1.5, len(self.made_up)))
+        return np.asarray(size * random_stream(self._seed, RandomStream.SLIPS, 1).uniform(0.5, 1.5, len(self.made_up)))
 
     @cached_property
     def _slips(self) -> Array:
         """What the string below turns unseen at each make-up, rad."""
         std = math.radians(self._section.unseen_std_deg)
-        return np.asarray(std * stream(self._seed, Stream.SLIPS, 0).standard_normal(len(self.made_up)))
+        return np.asarray(std * random_stream(self._seed, RandomStream.SLIPS, 0).standard_normal(len(self.made_up)))
 
     def _misread(self, tube: int) -> float:
         """Blunder (rad) in the mark between the head and a tube: of the first that is added, or that is there."""
@@ -102,7 +104,7 @@ class Marks:
 
         The string stands while a tube is added, so the new pair of joints adds up to the old one.
         """
-        random = stream(self._seed, Stream.JOINTS, 0)
+        random = random_stream(self._seed, RandomStream.JOINTS, 0)
         drive, lower = [0.0], [0.0]
         for tube in range(1, self._tubes + 1):
             angle = float(random.uniform(-math.pi, math.pi))
@@ -114,7 +116,7 @@ class Marks:
 
     @cached_property
     def _joint_errors(self) -> tuple[list[float], list[float]]:
-        random = stream(self._seed, Stream.JOINTS, 1)
+        random = random_stream(self._seed, RandomStream.JOINTS, 1)
         std = math.radians(self._section.reading_std_deg)
         draws = std * random.standard_normal((self._tubes + 1, 2))
         draws[:2, 1] = 0.0  # the lowest tube has no joint below

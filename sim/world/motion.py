@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Phase:
+class SchedulePhase:
     """One item of the schedule: ``add`` or ``hold``, ``drill`` and ``stop`` of a block, or the final ``finish``.
 
     ``tube`` is the top tube.
@@ -124,15 +124,15 @@ class Motion:
         first = max(at_start, 1)
         count = tubes - first + 1 if blocks is None else blocks
         self.lengths = np.minimum(first + np.arange(count), tubes)  # tubes in the string in each block
-        phases: list[Phase] = []
+        phases: list[SchedulePhase] = []
         at, before = begin, at_start
         for tube in self.lengths.tolist():
             added = tube > before
-            phases.append(Phase("add" if added else "hold", tube, at, at + add, at + joint if added else 0.0))
-            phases.append(Phase("drill", tube, at + add, at + add + turn.duration))
-            phases.append(Phase("stop", tube, phases[-1].end, phases[-1].end + stop))
+            phases.append(SchedulePhase("add" if added else "hold", tube, at, at + add, at + joint if added else 0.0))
+            phases.append(SchedulePhase("drill", tube, at + add, at + add + turn.duration))
+            phases.append(SchedulePhase("stop", tube, phases[-1].end, phases[-1].end + stop))
             at, before = phases[-1].end, tube
-        phases.append(Phase("finish", tubes, at, at + finish))
+        phases.append(SchedulePhase("finish", tubes, at, at + finish))
         self.phases = tuple(phases)
         self.end = at + finish
         self._starts = np.array([phase.start for phase in phases if phase.kind == "drill"])

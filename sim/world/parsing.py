@@ -35,7 +35,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise ScenarioError(f"{path}: not TOML: {error}") from error
 
 
-def validate(where: Path, tables: dict[str, Any], model: type[Model], version: int) -> Model:
+def validate_tables(where: Path, tables: dict[str, Any], model: type[Model], version: int) -> Model:
     """Model of the tables of ``where``, whose key ``version``, 1 where it is absent, is at most ``version``.
 
     Raises
@@ -52,7 +52,7 @@ def validate(where: Path, tables: dict[str, Any], model: type[Model], version: i
         raise ScenarioError(f"{where}: {_first(error.errors(), model)}") from error
 
 
-def meant(word: str, known: list[str]) -> str:
+def spelling_hint(word: str, known: list[str]) -> str:
     """What was probably meant by a word, and what there is."""
     near = difflib.get_close_matches(word, known, n=1)
     hint = f"did you mean {near[0]}? " if near else ""
@@ -67,7 +67,7 @@ def _first(errors: Sequence[ErrorDetails], model: type[BaseModel]) -> str:
     name = ".".join((*tables, key))
     if unknown is None:
         return f"{name}: {first['msg']}, got {first['input']!r:.60}"
-    return f"{name}: unknown key; {meant(key, _keys(model, tables))}"
+    return f"{name}: unknown key; {spelling_hint(key, _keys(model, tables))}"
 
 
 def _keys(model: type[BaseModel], tables: Sequence[str]) -> list[str]:

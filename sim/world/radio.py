@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.world.radio_section import LayerSection, PipeSection, RadioSection
-from sim.world.streams import Stream, stream
+from sim.world.random_streams import RandomStream, random_stream
 from telemetry.errors import RadioError
 from telemetry.radio.path_loss import link_margin, packet_error_rate, path_loss, propagation_constants, received_power
 from telemetry.radio.soil_dielectric import PorosityWarning, Soil, soil_permittivity
@@ -52,8 +52,10 @@ class RadioLinks:
         self.section = section
         self._tube_length = tube_length
         joints = range(1, tubes + 1)
-        self._fades = [section.fade_std_db * stream(seed, Stream.RADIO_FADE, k).standard_normal() for k in joints]
-        self._bursts = [Bursts(section, stream(seed, Stream.RADIO_BURSTS, k), begin, end) for k in joints]
+        self._fades = [
+            section.fade_std_db * random_stream(seed, RandomStream.RADIO_FADE, k).standard_normal() for k in joints
+        ]
+        self._bursts = [Bursts(section, random_stream(seed, RandomStream.RADIO_BURSTS, k), begin, end) for k in joints]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PorosityWarning)  # the user was warned when the scenario was loaded
             self._of_layers = layer_margins(section)

@@ -7,13 +7,13 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from node.firmware.tube_settings import MAX_REACH
-from sim.world.section import NotNegative, Positive, Section
+from sim.world.section import NotNegative, Positive, ScenarioSection
 from telemetry.radio.path_loss import THRESHOLD, TRANSMITTED, WIDTH
 
 Decibels = Annotated[float, Field(ge=-200.0, le=200.0)]
 
 
-class LayerSection(Section):
+class LayerSection(ScenarioSection):
     """One layer of the ground, from the top down."""
 
     to_m: Positive | None = Field(None, description="true vertical depth of its lower bound; of the last none")
@@ -24,7 +24,7 @@ class LayerSection(Section):
     temperature_c: float = 10.0
 
 
-class PipeSection(Section):
+class PipeSection(ScenarioSection):
     """The bore of the string as a waveguide."""
 
     radius_cm: Positive = Field(3.0, description="of the bore")
@@ -34,7 +34,7 @@ class PipeSection(Section):
     reach: int = Field(2, ge=1, le=MAX_REACH, description="tubes away that a node hears")
 
 
-class RadioSection(Section):
+class RadioSection(ScenarioSection):
     """A radio at both ends of every tube, and in the drive head."""
 
     mode: Literal["soil", "pipe"] = Field("soil", description="from tube end to tube end, or inside the bore")

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from node.kernels.arithmetic.formats import PERIOD
-from sim.world.marks import wrap
+from sim.world.marks import wrap_angle
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 from telemetry.messages import ENCODER
@@ -18,17 +18,17 @@ ROWS_A_CYCLE = 4
 SHORTEST_REST, SHORTEST_STOP = 10.0, 30.0  # s, that a scenario allows
 
 
-def record(world: World, folder: Path) -> None:
+def record_sensors(world: World, folder: Path) -> None:
     """Write ``encoder.npy`` and ``tube-N.npy`` for every tube, in the times of their own clocks (``timed:FILE``)."""
     step = PERIOD / ROWS_A_CYCLE
     ends = world.begin + step * np.arange(1.0, (world.end - world.begin) / step)
-    np.save(folder / "encoder.npy", counts(world, ends))
+    np.save(folder / "encoder.npy", encoder_rows(world, ends))
     for tube in range(1, world.scenario.tubes + 1):
         clock = np.array([world.local_clock(tube, end) for end in ends.tolist()])
         np.save(folder / f"tube-{tube}.npy", np.column_stack([clock, world.sensors.readings(tube, ends, step)]))
 
 
-def counts(world: World, ends: Array) -> Array:
+def encoder_rows(world: World, ends: Array) -> Array:
     """Rows of the encoder's counter at rig times ``ends`` (n,): time, count, last edge, 1, the edges before."""
     rows = []
     for end in ends.tolist():
@@ -75,4 +75,4 @@ def fastest_at(world: World, at: float) -> float:
 
 def yaw_error(world: World, tube: int, yaw: float, at: float) -> float:
     """What a yaw (rad) stated for the rig time ``at`` (s) is off, rad, beside the constant errors of the marks."""
-    return wrap(yaw - world.yaw_truth(tube, at) - world.systematic_error(tube, at))
+    return wrap_angle(yaw - world.yaw_truth(tube, at) - world.systematic_error(tube, at))

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from node.firmware.edge_interpolation import EDGES
+from sim.world.random_streams import RandomStream, random_stream
 from sim.world.rough_section import RoughEncoderSection
-from sim.world.streams import Stream, stream
 
 Array = npt.NDArray[np.float64]
 Counts = npt.NDArray[np.int64]
@@ -36,7 +36,7 @@ class RoughDisc:
     ) -> None:
         self._section, self._begin, self._t = section, begin, t
         self._errors, self._quantum = errors, math.tau / len(errors)
-        random = stream(seed, Stream.ROUGH_ENCODER)
+        random = random_stream(seed, RandomStream.ROUGH_ENCODER)
         self._phase, self._outliers = float(random.uniform(0.0, math.tau)), seed
         self._head = head
         self.shown = self._shown(head)
@@ -89,7 +89,7 @@ class RoughDisc:
             off += 0 if section.index and turns[1] != turns[0] else self._in_counts(section.jump_deg)
         if section.outliers:
             # one stream a reading: no draw depends on which others were asked for
-            random = stream(self._outliers, Stream.ROUGH_OUTLIERS, round((t - self._begin) * 1e6))
+            random = random_stream(self._outliers, RandomStream.ROUGH_OUTLIERS, round((t - self._begin) * 1e6))
             if random.random() < section.outliers:
                 off += self._in_counts(section.outlier_deg * float(random.standard_normal()))
         return off

@@ -11,9 +11,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim.world.motion import Motion, Phase
+from sim.world.motion import Motion, SchedulePhase
+from sim.world.random_streams import RandomStream, random_stream
 from sim.world.rough_section import RoughDriveSection, RoughSection, RoughStringSection
-from sim.world.streams import Stream, stream
 from sim.world.torsion import smooth_step
 
 Array = npt.NDArray[np.float64]
@@ -69,7 +69,7 @@ class RoughMotion:
         added = np.zeros_like(self.t)
         for drill in self._drills:
             inside = (self.t >= drill.start) & (self.t <= drill.end)
-            added[inside] += swings(section, rate[inside], self.t[inside] - drill.start)
+            added[inside] += swing_angle(section, rate[inside], self.t[inside] - drill.start)
             end = float(motion.drive(np.array([drill.end]))[0][0])
             added -= missed_by_dead_stop(section, motion, drill, base, end)
             back = smooth_step(self.t - drill.end - BACK_AFTER, BACK_WITHIN)[0]
@@ -78,7 +78,7 @@ class RoughMotion:
 
     def _turned_further(self, section: RoughDriveSection, motion: Motion, base: Array, seed: int) -> Array:
         """Angle (n,) rad by which the head turns beyond the schedule's, evenly with that: a driller stops anywhere."""
-        parts = stream(seed, Stream.ROUGH_STOP_ANGLES).random(len(self._drills))
+        parts = random_stream(seed, RandomStream.ROUGH_STOP_ANGLES).random(len(self._drills))
         further = np.zeros_like(base)
         for part, drill in zip(parts.tolist(), self._drills, strict=True):
             begin, end = motion.drive(np.array([drill.start, drill.end]))[0]
@@ -91,7 +91,7 @@ class RoughMotion:
         if play == 0.0:
             return self.head
         string = self.head.copy()
-        parts = stream(seed, Stream.ROUGH_STOPS).random(len(self._drills))
+        parts = random_stream(seed, RandomStream.ROUGH_STOPS).random(len(self._drills))
         for k, drill in enumerate(self._drills):
             last = self._drills[k + 1].end if k + 1 < len(self._drills) else math.inf
             after = (self.t > drill.end) & (self.t <= last)
@@ -101,7 +101,7 @@ class RoughMotion:
         return string
 
 
-def swings(section: RoughDriveSection, rate: Array, u: Array) -> Array:
+def swing_angle(section: RoughDriveSection, rate: Array, u: Array) -> Array:
     """Angle (n,) that ripple and stick-slip add at a mean ``rate`` (n,) rad/s, ``u`` (n,) s after the drive's start.
 
     Ripple: w (1 + r sin x). Stick-slip: w (8/3) sin^4(x/2) = w (1 - 4/3 cos x + 1/3 cos 2x), which stands for a
@@ -114,7 +114,9 @@ def swings(section: RoughDriveSection, rate: Array, u: Array) -> Array:
     return np.asarray(rate * (ripple + slip))
 
 
-def missed_by_dead_stop(section: RoughDriveSection, motion: Motion, drill: Phase, base: Array, end: float) -> Array:
+def missed_by_dead_stop(
+    section: RoughDriveSection, motion: Motion, drill: SchedulePhase, base: Array, end: float
+) -> Array:
     """Angle (n,) rad that a head does not turn which stops dead at ``dead_stop_dps`` instead of easing out."""
     if section.dead_stop_dps == 0.0:
         return np.zeros_like(base)

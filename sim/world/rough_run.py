@@ -9,13 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.world.borehole import Borehole
-from sim.world.disturbance.reading import move_tube
 from sim.world.disturbance.row import OneImu, TubeMotion
+from sim.world.disturbance.sensor_reading import move_tube
 from sim.world.motion import Motion
 from sim.world.rough_disc import RoughDisc
 from sim.world.rough_motion import RoughMotion
 from sim.world.rough_section import RoughSection
-from sim.world.rough_truth import RoughTruth, transported
+from sim.world.rough_truth import RoughTruth, transport_angle
 from sim.world.scenario_file import ScenarioFile
 from sim.world.truth import Twist
 
@@ -64,5 +64,5 @@ class RoughRun:
             angle = angle - twist(moved.t)[0]
         if section.string.transport == "parallel":
             reached = np.maximum(self._schedule.depth(moved.t)[0] - below, 0.0)
-            angle = angle + transported(hole, reached)
+            angle = angle + transport_angle(hole, reached)
         return RoughTruth(moved.t, angle, hole, self._schedule, below, joint_angle, radius, gravity, None, unseen)

@@ -10,10 +10,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from sim.world.section import NotNegative, Positive, Probability, Section
+from sim.world.section import NotNegative, Positive, Probability, ScenarioSection
 
 
-class RoughDriveSection(Section):
+class RoughDriveSection(ScenarioSection):
     """How the drive head turns."""
 
     ripple: float = Field(0.0, ge=0.0, le=1.0, description="swing of the rate, of itself")
@@ -25,7 +25,7 @@ class RoughDriveSection(Section):
     stop_spread_deg: NotNegative = Field(0.0, le=360.0, description="drawn up to so much more turning before each stop")
 
 
-class RoughStringSection(Section):
+class RoughStringSection(ScenarioSection):
     """How the string follows the head, untold by any torque."""
 
     backlash_deg: NotNegative = Field(0.0, le=10.0, description="play; a string that stops runs on into it")
@@ -38,7 +38,7 @@ class RoughStringSection(Section):
     )
 
 
-class RoughEncoderSection(Section):
+class RoughEncoderSection(ScenarioSection):
     """The encoder and how it sits on the head."""
 
     eccentricity_deg: NotNegative = Field(0.0, le=5.0, description="amplitude of the error of once a turn")
@@ -51,7 +51,7 @@ class RoughEncoderSection(Section):
     outlier_deg: NotNegative = Field(1.0, description="1 sigma of these")
 
 
-class RoughVibrationSection(Section):
+class RoughVibrationSection(ScenarioSection):
     """Vibration of a tube; its spectrum is flat between two frequencies."""
 
     turning_g: NotNegative = Field(0.0, description="rms of each axis while the string turns")
@@ -61,7 +61,7 @@ class RoughVibrationSection(Section):
     highest_hz: Positive = 300.0
 
 
-class RoughSensorSection(Section):
+class RoughSensorSection(ScenarioSection):
     """Front end of every IMU: samples, filter, FIFO, clock. A node knows its filter, as a driver does."""
 
     frames_hz: NotNegative = Field(0.0, le=1000.0, description="of the FIFO; 0: the exact mean of every cycle")
@@ -84,7 +84,7 @@ class RoughSensorSection(Section):
         return 0.0 if self.low_pass_hz == 0.0 else 1.0 / (math.sqrt(2.0) * math.pi * self.low_pass_hz)
 
 
-class RoughSection(Section):
+class RoughSection(ScenarioSection):
     """The field's world."""
 
     samples_hz: float = Field(1000.0, ge=50.0, le=5000.0, description="at which motion and vibration are followed")

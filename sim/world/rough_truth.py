@@ -48,12 +48,14 @@ class RoughTruth(TubeTruth):
         if t is not self._grid:
             return super().rate_and_force(t)
         rates, forces = np.empty((len(t), 3)), np.empty((len(t), 3))
-        feel(self.yaw(t), *self._course[1:], *self._along(t), self._radius, self._gravity, rates, forces)
+        fill_rates_and_forces(
+            self.yaw(t), *self._course[1:], *self._along(t), self._radius, self._gravity, rates, forces
+        )
         return rates, forces
 
 
 @kernel
-def feel(
+def fill_rates_and_forces(
     yaw: Array,
     turning: Array,
     angular: Array,
@@ -90,7 +92,7 @@ def feel(
         forces[n, 1] += radius * angular[n]
 
 
-def transported(hole: Borehole, depths: Array) -> Array:
+def transport_angle(hole: Borehole, depths: Array) -> Array:
     """Gamma (n,) rad at the depths (n,) m: what parallel transport turns against the smallest rotation from down."""
     md = np.linspace(0.0, hole.length, TRANSPORT_STEPS)
     tangent, slope = hole.tangent(md)

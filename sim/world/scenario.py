@@ -9,8 +9,8 @@ from typing import Any
 from sim.errors import ScenarioError
 from sim.node_kills import KillNode, parse_fault
 from sim.world.borehole import Borehole, read_displacements, read_stations
-from sim.world.parsing import read_toml, validate
-from sim.world.scenario_checks import check
+from sim.world.parsing import read_toml, validate_tables
+from sim.world.scenario_checks import check_scenario
 from sim.world.scenario_file import VERSION, PathSection, ScenarioFile
 from sim.world.shipped import find_scenario
 
@@ -55,7 +55,7 @@ def scenario_of(tables: dict[str, Any], faults: tuple[str, ...] = ()) -> Scenari
         As ``load_scenario``.
     """
     where = Path("scenario")
-    return _checked(where, validate(where, tables, ScenarioFile, VERSION), faults)
+    return _checked(where, validate_tables(where, tables, ScenarioFile, VERSION), faults)
 
 
 def load_scenario(path: Path, faults: tuple[str, ...] = ()) -> Scenario:
@@ -69,11 +69,11 @@ def load_scenario(path: Path, faults: tuple[str, ...] = ()) -> Scenario:
         One line: the file, the key or line, what was expected and what came.
     """
     path = find_scenario(path)
-    return _checked(path, validate(path, read_toml(path), ScenarioFile, VERSION), faults)
+    return _checked(path, validate_tables(path, read_toml(path), ScenarioFile, VERSION), faults)
 
 
 def _checked(path: Path, file: ScenarioFile, faults: tuple[str, ...]) -> Scenario:
-    check(path, file)
+    check_scenario(path, file)
     hole = _hole(path, file.path, file.depth)
     if hole.length + 1e-9 < file.depth:
         raise ScenarioError(

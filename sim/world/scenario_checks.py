@@ -8,8 +8,8 @@ import numpy as np
 
 from groundstation.calibration.attitudes import rank_of, true_vectors
 from sim.errors import ScenarioError
-from sim.world.disturbance.table import TABLE
-from sim.world.parsing import validate
+from sim.world.disturbance.disturbance_table import TABLE
+from sim.world.parsing import validate_tables
 from sim.world.radio import check_radio
 from sim.world.scenario_file import AidingSection, CalibrationSection, ScenarioFile
 from telemetry.errors import RadioError
@@ -20,7 +20,7 @@ SURVEY_AFTER = 22.0  # s at rest, for a survey
 RECORD_MARGIN = 8.0  # s at an attitude beside its record: the tubes settle and the order travels
 
 
-def check(path: Path, file: ScenarioFile) -> None:
+def check_scenario(path: Path, file: ScenarioFile) -> None:
     """Refuse what no rig could run.
 
     Raises
@@ -183,4 +183,4 @@ def _check_disturbances(path: Path, file: ScenarioFile) -> None:
         if section is None:
             known = ", ".join(sections) or "none"
             raise ScenarioError(f"{path}: disturbance.{name}: no such disturbance has a table; expected one of {known}")
-        validate(Path(f"{path}: disturbance.{name}"), table, section, 1)
+        validate_tables(Path(f"{path}: disturbance.{name}"), table, section, 1)

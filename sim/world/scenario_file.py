@@ -14,14 +14,14 @@ from node.firmware.kernel_choice import LOOPS
 from node.kernels.record.sensor_record import MAX_IMUS
 from sim.world.radio_section import RadioSection
 from sim.world.rough_section import RoughSection
-from sim.world.section import Angle, NotNegative, Positive, Probability, Section, Triple
+from sim.world.section import Angle, NotNegative, Positive, Probability, ScenarioSection, Triple
 from sim.world.site_section import SiteSection
 from telemetry.messages import MAX_TUBE
 
 VERSION = 1  # of the format
 
 
-class RigSection(Section):
+class RigSection(ScenarioSection):
     """The string."""
 
     tubes: int = Field(ge=1, le=MAX_TUBE, description="tubes of the string at the end")
@@ -42,14 +42,14 @@ class RigSection(Section):
         return self.hanging if self.depth_at_start_m is None else self.depth_at_start_m
 
 
-class StraightSection(Section):
+class StraightSection(ScenarioSection):
     """A straight hole."""
 
     inclination_deg: float = Field(0.0, ge=0.0, lt=180.0)
     azimuth_deg: Angle = 0.0
 
 
-class SpiralSection(Section):
+class SpiralSection(ScenarioSection):
     """A hole whose azimuth turns evenly over its length, and its inclination with it."""
 
     inclination_deg: float = Field(0.0, ge=0.0, le=90.0)
@@ -58,7 +58,7 @@ class SpiralSection(Section):
     build_deg: float = Field(0.0, ge=-90.0, le=90.0, description="of the inclination, likewise")
 
 
-class PathSection(Section):
+class PathSection(ScenarioSection):
     """The hole; exactly one of the four, files relative to the scenario."""
 
     displacements: str | None = Field(None, description="CSV md_m,a_cm,b_cm: lateral displacement over one interval")
@@ -67,7 +67,7 @@ class PathSection(Section):
     spiral: SpiralSection | None = Field(None, description="a hole whose azimuth turns, as long as it takes")
 
 
-class ScheduleSection(Section):
+class ScheduleSection(ScenarioSection):
     """Times of one tube, s."""
 
     begin_s: Positive = Field(1000.0, description="rig time at the start; never zero")
@@ -82,7 +82,7 @@ class ScheduleSection(Section):
     )
 
 
-class RotationSection(Section):
+class RotationSection(ScenarioSection):
     """Turning of the string while one tube is drilled."""
 
     rate_dps: float = Field(71.0, gt=0.0, description="constant rate, deg/s")
@@ -91,7 +91,7 @@ class RotationSection(Section):
     advance_m: NotNegative | None = Field(None, description="of the bit in one block; one tube length if absent")
 
 
-class JointSection(Section):
+class JointSection(ScenarioSection):
     """Constant angular errors, 1 sigma."""
 
     reading_std_deg: NotNegative = Field(0.05, description="of the scribe marks at a joint")
@@ -103,7 +103,7 @@ class JointSection(Section):
     head_turn_deg: NotNegative = Field(0.0, description="about how far the head turns, free of the string, at each")
 
 
-class TorsionSection(Section):
+class TorsionSection(ScenarioSection):
     """Twist of the string by the drilling torque; without this table the string is rigid."""
 
     outer_diameter_m: Positive = Field(0.060, le=1.0, description="of every tube")
@@ -121,7 +121,7 @@ class TorsionSection(Section):
     stick_slip_hz: float = Field(0.2, gt=0.0, le=0.9, description="of the swing")
 
 
-class GyroSection(Section):
+class GyroSection(ScenarioSection):
     """Gyroscope of every node, axes x, y, z."""
 
     noise_dps_rthz: Triple = Field((8.538e-3, 6.799e-3, 7.313e-3), description="angle random walk")
@@ -139,7 +139,7 @@ class GyroSection(Section):
     resolution_dps: NotNegative = Field(2.6e-3, description="500 deg/s / 32768 over 34 readings of one cycle")
 
 
-class AccelerometerSection(Section):
+class AccelerometerSection(ScenarioSection):
     """Accelerometer of every node, as its readings come: the sensor's own, or what a calibration has left of it."""
 
     noise_deg: NotNegative = Field(0.02, description="one 1.9 Hz sample, as a tilt")
@@ -151,7 +151,7 @@ class AccelerometerSection(Section):
     gravity_mps2: Positive = 9.81
 
 
-class EncoderSection(Section):
+class EncoderSection(ScenarioSection):
     """Encoder of the drive head."""
 
     counts_per_turn: int = Field(4096, ge=16, description="1024 lines in quadrature")
@@ -162,7 +162,7 @@ class EncoderSection(Section):
     )
 
 
-class ClockSection(Section):
+class ClockSection(ScenarioSection):
     """Clocks of the nodes against the encoder's; the last four where ``medium.link`` is off."""
 
     offset_std_s: NotNegative = 20.0
@@ -173,7 +173,7 @@ class ClockSection(Section):
     stated_std_ms: NotNegative | None = Field(None, description="what a node takes joint_std_ms for, if not the truth")
 
 
-class MediumSection(Section):
+class MediumSection(ScenarioSection):
     """One hop between two tube ends."""
 
     link: Literal["on", "off"] = Field(
@@ -204,7 +204,7 @@ class MediumSection(Section):
         return self.jitter_ms * 1e-3
 
 
-class AidingSection(Section):
+class AidingSection(ScenarioSection):
     """When the encoder is heard at all, where the link is off; the phase is drawn for each seed."""
 
     on_s: Positive = Field(20.0, description="heard for so long")
@@ -229,7 +229,7 @@ def known_kernel(name: str) -> str:
 KernelName = Annotated[str, AfterValidator(known_kernel)]
 
 
-class NodeSection(Section):
+class NodeSection(ScenarioSection):
     """Firmware settings of every node."""
 
     scheme: Literal["forward", "estimate", "intersection"] = Field(
@@ -251,7 +251,7 @@ class NodeSection(Section):
     )
 
 
-class DesignSection(Section):
+class DesignSection(ScenarioSection):
     """The column that the hole is to become, as the ground station judges it."""
 
     inclination_deg: float = Field(0.0, ge=0.0, le=180.0)
@@ -261,7 +261,7 @@ class DesignSection(Section):
     tolerance: Literal["en-12716", "5-cm", "0.27-deg"] = "en-12716"
 
 
-class DriftSection(Section):
+class DriftSection(ScenarioSection):
     """What became of the sensors since their last calibration, drawn for each tube and constant over the run."""
 
     accelerometer_scale_std: float = Field(0.0, ge=0.0, le=0.04, description="of each axis")
@@ -270,7 +270,7 @@ class DriftSection(Section):
     gyroscope_bias_std_dps: float = Field(0.0, ge=0.0, le=0.1, description="of each axis; a node learns it at rest")
 
 
-class CalibrationSection(Section):
+class CalibrationSection(ScenarioSection):
     """A rack in which all tubes are calibrated, joined, before the first is drilled in; see docs/calibration.md."""
 
     attitudes_deg: tuple[tuple[Angle, Angle], ...] = Field(
@@ -284,7 +284,7 @@ class CalibrationSection(Section):
     attitude_std_deg: NotNegative = Field(0.01, description="of the rack, about each axis, at each attitude")
 
 
-class ScenarioFile(Section):
+class ScenarioFile(ScenarioSection):
     """A whole scenario file."""
 
     version: int = Field(VERSION, ge=1, description="of this format; a newer one is refused")

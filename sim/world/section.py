@@ -13,7 +13,7 @@ Angle = Annotated[float, Field(ge=-180.0, le=180.0)]
 Triple = tuple[NotNegative, NotNegative, NotNegative]
 
 
-class Section(BaseModel):
+class ScenarioSection(BaseModel):
     """Base of every table: frozen, unknown keys, infinities and NaN refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

@@ -14,11 +14,11 @@ from sim.world.disturbance.bias_step import stepped_bias
 from sim.world.disturbance.drift import Drift, draw_drift
 from sim.world.disturbance.gyroscope import draw_gyroscope
 from sim.world.disturbance.mount_tilt import draw_tilt
-from sim.world.disturbance.reading import Cycles, read_eighths, read_grid, read_means
 from sim.world.disturbance.row import ImuSamples, OneImu
-from sim.world.disturbance.wander import wandering
+from sim.world.disturbance.sensor_reading import Cycles, read_eighths, read_grid, read_means
+from sim.world.disturbance.wander import wandering_bias
 from sim.world.drill_string import DrillString
-from sim.world.streams import Stream, stream
+from sim.world.random_streams import RandomStream, random_stream
 from sim.world.truth import imu_frame
 
 Array = npt.NDArray[np.float64]
@@ -79,7 +79,7 @@ class Sensors:
             rate = truth.rate(ends)
         if (rack := self._string.rack) is not None:
             racked, mount = ends <= rack.end, self._string.marks.mounts[tube]
-            random = stream(self._string.seed, Stream.RACK, tube)
+            random = random_stream(self._string.seed, RandomStream.RACK, tube)
             held = rack.truth(random, mount, self._file.accelerometer.gravity_mps2)
             rate[racked], force[racked] = held.cycle_means(ends[racked], period)
         turning = ((motion.drive(ends)[1] > 0.0) | (motion.drive(ends - period)[1] > 0.0)).astype(float)
@@ -99,7 +99,7 @@ class Sensors:
         """True bias (cycles,) of a tube's z gyroscope, rad/s: what is constant, what wanders, and its step."""
         imu, limit = self._imu(tube), math.radians(self._file.gyroscope.range_dps)
         constant = draw_gyroscope(imu).bias[2]
-        drawn = np.clip(constant + wandering(imu, self._string.cycles, PERIOD)[:, 2], -limit, limit)
+        drawn = np.clip(constant + wandering_bias(imu, self._string.cycles, PERIOD)[:, 2], -limit, limit)
         return np.asarray(drawn + stepped_bias(imu, self._ends(tube)))
 
     def drift(self, tube: int, imu: int = 0) -> Drift | None:

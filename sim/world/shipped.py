@@ -6,7 +6,7 @@ import itertools
 from pathlib import Path
 
 from sim.errors import ScenarioError
-from sim.world.parsing import meant, read_toml
+from sim.world.parsing import read_toml, spelling_hint
 
 # a wheel holds them inside this package; a checkout at its top, where people look for them
 FOLDERS = (Path(__file__).parents[1] / "scenarios", Path(__file__).parents[2] / "scenarios")
@@ -31,7 +31,7 @@ def shipped_names() -> list[str]:
     return sorted(path.stem for path in shipped_folder().glob("*.toml"))
 
 
-def title(file: Path) -> str:
+def scenario_title(file: Path) -> str:
     """First sentence of the comment at the head of a scenario file, empty without one."""
     comment = itertools.takewhile(lambda line: line.startswith("#"), file.read_text(encoding="utf-8").splitlines())
     return " ".join(line.lstrip("# ") for line in comment).partition(". ")[0].rstrip(".")
@@ -50,7 +50,7 @@ def find_scenario(given: Path) -> Path:
     names = shipped_names()
     if given.name in names:
         return shipped_folder() / f"{given.name}.toml"
-    raise ScenarioError(f"{given}: expected a scenario file or a name; {meant(given.name, names)}")
+    raise ScenarioError(f"{given}: expected a scenario file or a name; {spelling_hint(given.name, names)}")
 
 
 def files_of(scenario: Path) -> list[Path]:

@@ -6,10 +6,10 @@ from typing import Annotated
 
 from pydantic import Field
 
-from sim.world.section import Angle, Positive, Section
+from sim.world.section import Angle, Positive, ScenarioSection
 
 
-class HoleSection(Section):
+class HoleSection(ScenarioSection):
     """A straight hole of the site: where its head stands and how it leans."""
 
     name: str = Field(min_length=1, max_length=32, pattern=r"^[A-Za-z0-9_]+$")
@@ -19,7 +19,7 @@ class HoleSection(Section):
     azimuth_deg: Angle = 0.0
 
 
-class SiteSection(Section):
+class SiteSection(ScenarioSection):
     """A wall; its holes are drilled in this order, and each is judged with those before it."""
 
     name: str = Field("wall", min_length=1, max_length=64)

@@ -25,7 +25,7 @@ def polar_moment(outer: float, inner: float) -> float:
     return math.pi / 32.0 * (outer**4 - inner**4)
 
 
-def stiffness(section: TorsionSection, tube_length: float) -> float:
+def torsional_stiffness(section: TorsionSection, tube_length: float) -> float:
     """G J / L of one tube, N m/rad."""
     moment = polar_moment(section.outer_diameter_m, section.inner_diameter_m)
     return section.shear_modulus_gpa * 1e9 * moment / tube_length
@@ -39,15 +39,15 @@ def smooth_step(t: Array, duration: float) -> Course:
     return value, rate, 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / duration**2
 
 
-def product(a: Course, b: Course) -> Course:
+def product_rule(a: Course, b: Course) -> Course:
     """Product rule, twice."""
     return a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + 2.0 * a[1] * b[1] + a[0] * b[2]
 
 
-def blend(one: Course, other: Course, share: Course) -> Course:
+def blend_values(one: Course, other: Course, share: Course) -> Course:
     """``one`` (1 - share) + ``other`` share."""
     difference = (other[0] - one[0], other[1] - one[1], other[2] - one[2])
-    moved = product(difference, share)
+    moved = product_rule(difference, share)
     return one[0] + moved[0], one[1] + moved[1], one[2] + moved[2]
 
 
@@ -71,7 +71,7 @@ class StringTorsion:
         self._length = tube_length
         self._tubes = np.asarray(lengths, float)
         self._trapped = np.asarray(trapped, float)
-        self._compliance = 1.0 / (stiffness(section, tube_length) * tube_length)  # rad/(N m) a metre
+        self._compliance = 1.0 / (torsional_stiffness(section, tube_length) * tube_length)  # rad/(N m) a metre
         drills = [phase for phase in motion.phases if phase.kind == "drill"]
         self._starts = np.array([phase.start for phase in drills])
         self._ends = np.array([phase.end for phase in drills])
@@ -85,8 +85,10 @@ class StringTorsion:
         before = self._left(tube, block - 1)
         kept = self._trapped[block]
         after = (kept * loaded[0], kept * loaded[1], kept * loaded[2])
-        worn = blend(blend((before, zero, zero), loaded, self._wound(block, t)), after, self._released(block, t))
-        slip = product(loaded, self._stick_slip(block, t))
+        worn = blend_values(
+            blend_values((before, zero, zero), loaded, self._wound(block, t)), after, self._released(block, t)
+        )
+        slip = product_rule(loaded, self._stick_slip(block, t))
         return started * (worn[0] + slip[0]), started * (worn[1] + slip[1]), started * (worn[2] + slip[2])
 
     def torque(self, t: Array) -> Array:
@@ -138,5 +140,5 @@ class StringTorsion:
         phase = omega * (t - self._starts[block])
         sine, cosine = amplitude * np.sin(phase), amplitude * np.cos(phase)
         done = self._released(block, t)
-        on = product(self._wound(block, t), (1.0 - done[0], -done[1], -done[2]))
-        return product((sine, omega * cosine, -(omega**2) * sine), on)
+        on = product_rule(self._wound(block, t), (1.0 - done[0], -done[1], -done[2]))
+        return product_rule((sine, omega * cosine, -(omega**2) * sine), on)

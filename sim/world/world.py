@@ -18,10 +18,10 @@ from sim.errors import ScenarioError
 from sim.node_kills import KillNode
 from sim.world.drill_string import DrillString
 from sim.world.radio import RadioLinks
+from sim.world.random_streams import RandomStream, random_stream
 from sim.world.scenario import Scenario
 from sim.world.sensors import Sensors
-from sim.world.streams import Stream, stream
-from sim.world.torsion import stiffness
+from sim.world.torsion import torsional_stiffness
 from telemetry.messages import BASE, ENCODER
 
 
@@ -146,7 +146,7 @@ class World(DrillString):
     def _stiffness(self) -> float:
         """Of a tube as the crew knows it, N m/rad."""
         section = self.scenario.file.torsion
-        return math.inf if section is None else stiffness(section, self.scenario.tube_length)
+        return math.inf if section is None else torsional_stiffness(section, self.scenario.tube_length)
 
     @cached_property
     def _torques(self) -> dict[float, float]:
@@ -164,7 +164,7 @@ class World(DrillString):
     def _clocks(self) -> dict[int, tuple[float, float]]:
         """Offset (s) and drift of the clock of each process against that of the encoder, by address."""
         clocks = self.scenario.file.clocks
-        draws = stream(self.seed, Stream.CLOCKS, 0).standard_normal((self.scenario.tubes + 1, 2))
+        draws = random_stream(self.seed, RandomStream.CLOCKS, 0).standard_normal((self.scenario.tubes + 1, 2))
         drawn = [(clocks.offset_std_s * a, clocks.drift_std_ppm * 1e-6 * b) for a, b in draws.tolist()]
         return {ENCODER: (0.0, 0.0), BASE: drawn[0]} | dict(enumerate(drawn[1:], 1))
 

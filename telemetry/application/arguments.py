@@ -12,7 +12,7 @@ from telemetry.messages import MAX_TUBE, Value
 from telemetry.quantities import (
     Quantity,
     ValueKind,
-    bound,
+    bound_text,
     check_boolean,
     check_integer,
     check_integers,
@@ -154,7 +154,7 @@ def _expected(quantity: Quantity) -> str:
         case ValueKind.NUMBER:
             return f"expected {what or 'a number'}"
         case ValueKind.INTEGER:
-            return f"expected an integer of {bound(quantity.low)}..{bound(quantity.high)}"
+            return f"expected an integer of {bound_text(quantity.low)}..{bound_text(quantity.high)}"
         case ValueKind.INTEGERS:
             return f"expected integers of {what} as 1,2,3"
         case _:

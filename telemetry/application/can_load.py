@@ -16,10 +16,10 @@ from telemetry.frozen import replace
 from telemetry.media.can_exchange import PRESENCE_EVERY
 from telemetry.media.can_timing import CLASSIC_LARGEST, FD_LARGEST, BitRates
 from telemetry.media.isotp import frame_lengths
-from telemetry.messages import Aiding, Hello, Message, Mode, NodeFlag, NodeState, TimeReply, TimeRequest
+from telemetry.messages import Aiding, Hello, Message, NodeFlag, NodeMode, NodeState, TimeReply, TimeRequest
 from telemetry.presentation.can_messages import NATIVE
 from telemetry.presentation.can_native import HEADER_EVERY
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.schema import SPEC_OF
 from telemetry.transport.hop import Header, pack_frame
 from telemetry.transport.joint_seal import OVERHEAD as JOINT_SEAL
@@ -31,7 +31,8 @@ PROFILES = ("tunnel", "native")
 HEADER = Header(250, 7 << 24 | 1 << 8 | 250, 500_000, 6 << 24 | 249, 3000, 0)
 AIDING = Aiding(1.2345678, 2.5e-6, 1.5e-6, -0.123456, 1.2345678, 5000.123456, 3 << 32 | 9000, 24, 480.0, 1e-6, True)
 STATE = NodeState(
-    24, 5000.123456, 25, Mode.TRACKING, 1.2345678, 2.5e-6, 1.5e-6, (1e-3, -2e-3, 3e-3), 1e-3, 1e-4, 3e-6, 0.53, 1e-8,
+    24, 5000.123456, 25, NodeMode.TRACKING, 1.2345678, 2.5e-6, 1.5e-6, (1e-3, -2e-3, 3e-3), 1e-3, 1e-4, 3e-6, 0.53,
+    1e-8,
     NodeFlag.NONE, 9000, 0, 2, bytes(range(8)), (1e-3, 2e-3, 3e-4),
 )  # fmt: skip
 
@@ -49,7 +50,7 @@ def steady_traffic(tubes: int, cycle: float = CYCLE) -> list[RepeatedMessage]:
     return [
         RepeatedMessage(AIDING, 1.0 / cycle),
         RepeatedMessage(STATE, tubes / cycle),
-        RepeatedMessage(Hello(250, 7, 25, Mode.TRACKING, 0.99), 2.0 / HELLO_PERIOD),
+        RepeatedMessage(Hello(250, 7, 25, NodeMode.TRACKING, 0.99), 2.0 / HELLO_PERIOD),
         RepeatedMessage(TimeRequest(5000.123456), 1.0 / SYNC_PERIOD),
         RepeatedMessage(TimeReply(5000.1, 5000.2, 5000.3, 5000.4, 1.0000012, 1e-8), 1.0 / SYNC_PERIOD),
     ]
@@ -58,11 +59,11 @@ def steady_traffic(tubes: int, cycle: float = CYCLE) -> list[RepeatedMessage]:
 def link_bytes(message: Message, *, sealed: bool) -> int:
     """Size (bytes) of a frame of the link that carries only this message."""
     if not sealed:
-        return len(pack_frame(HEADER, [(0, encode(message))]))
+        return len(pack_frame(HEADER, [(0, encode_message(message))]))
     if isinstance(message, Aiding):
         message = replace(message, seal=bytes(SEAL_SIZE))
     own = bytes(END_SEAL) if isinstance(message, NodeState) else b""
-    return JOINT_SEAL + len(pack_frame(HEADER, [(0, own + encode(message))]))
+    return JOINT_SEAL + len(pack_frame(HEADER, [(0, own + encode_message(message))]))
 
 
 def frame_bytes(message: Message, profile: str, *, fd: bool, sealed: bool = False) -> list[int]:

@@ -4,35 +4,35 @@ from __future__ import annotations
 
 from telemetry.media.port import Priority
 from telemetry.messages import Event, Kept, Severity
-from telemetry.schema import Kind
+from telemetry.schema import MessageKind
 
-ONE_HOP = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY)
+ONE_HOP = (MessageKind.AIDING, MessageKind.HELLO, MessageKind.TIME_REQUEST, MessageKind.TIME_REPLY)
 RELIABLE = (
-    Kind.SURVEY_MEASUREMENT,
-    Kind.EVENT,
-    Kind.REPLY,
-    Kind.RECEIPT,
-    Kind.COMMAND,
-    Kind.BLOCK_SEGMENT,
-    Kind.BLOCK_STATUS,
-    Kind.STATIC_RECORD,
+    MessageKind.SURVEY_MEASUREMENT,
+    MessageKind.EVENT,
+    MessageKind.REPLY,
+    MessageKind.RECEIPT,
+    MessageKind.COMMAND,
+    MessageKind.BLOCK_SEGMENT,
+    MessageKind.BLOCK_STATUS,
+    MessageKind.STATIC_RECORD,
 )
-PRIORITIES: dict[Kind, Priority] = {
-    Kind.TIME_REQUEST: Priority.TIME,
-    Kind.TIME_REPLY: Priority.TIME,
-    Kind.AIDING: Priority.AIDING,
-    Kind.HELLO: Priority.HELLO,
-    Kind.COMMAND: Priority.COMMAND,
-    Kind.RECEIPT: Priority.COMMAND,
-    Kind.SURVEY_MEASUREMENT: Priority.SURVEY,
-    Kind.EVENT: Priority.SURVEY,
-    Kind.REPLY: Priority.SURVEY,
-    Kind.NODE_STATE: Priority.STATE,
-    Kind.STATIC_RECORD: Priority.SURVEY,
-    Kind.BLOCK_STATUS: Priority.SURVEY,
-    Kind.BLOCK_SEGMENT: Priority.BLOCK,
-    Kind.DEPTH_READING: Priority.STATE,
-    Kind.SESSION_OFFER: Priority.COMMAND,
+PRIORITIES: dict[MessageKind, Priority] = {
+    MessageKind.TIME_REQUEST: Priority.TIME,
+    MessageKind.TIME_REPLY: Priority.TIME,
+    MessageKind.AIDING: Priority.AIDING,
+    MessageKind.HELLO: Priority.HELLO,
+    MessageKind.COMMAND: Priority.COMMAND,
+    MessageKind.RECEIPT: Priority.COMMAND,
+    MessageKind.SURVEY_MEASUREMENT: Priority.SURVEY,
+    MessageKind.EVENT: Priority.SURVEY,
+    MessageKind.REPLY: Priority.SURVEY,
+    MessageKind.NODE_STATE: Priority.STATE,
+    MessageKind.STATIC_RECORD: Priority.SURVEY,
+    MessageKind.BLOCK_STATUS: Priority.SURVEY,
+    MessageKind.BLOCK_SEGMENT: Priority.BLOCK,
+    MessageKind.DEPTH_READING: Priority.STATE,
+    MessageKind.SESSION_OFFER: Priority.COMMAND,
 }
 
 

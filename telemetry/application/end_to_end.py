@@ -28,8 +28,8 @@ from telemetry.messages import (
     SessionOffer,
 )
 from telemetry.presentation.content import content_of, content_of_message
-from telemetry.presentation.msgpack_codec import Opened, decode_opened, encode, open_payload
-from telemetry.schema import Kind
+from telemetry.presentation.msgpack_codec import Opened, decode_opened, encode_message, open_payload
+from telemetry.schema import MessageKind
 from telemetry.transport.hop import HopLink
 from telemetry.unwritten import Content
 
@@ -82,7 +82,7 @@ class EndToEndDelivery:
 
         Messages other than warnings go up with the next states, in their frames.
         """
-        payload, needed = encode(message), is_needed(message)
+        payload, needed = encode_message(message), is_needed(message)
         if is_warning(message) or not self.has_states:
             self._outbox.keep_payload(message.sequence, payload, now, needed=needed)
         else:
@@ -111,13 +111,13 @@ class EndToEndDelivery:
 
     def reply(self, reply: Reply) -> None:
         """Answer a command and keep the answer: a repeated command is answered, not obeyed again."""
-        payload = encode(reply)
+        payload = encode_message(reply)
         self._answers.keep(reply.sequence, payload)
         self._send_up(payload)
 
     def send_status(self, status: BlockStatus) -> None:
         """Tell the ground station the state of an upload."""
-        self._send_up(encode(status))
+        self._send_up(encode_message(status))
 
     def open_from_base(self, opened: Opened, payload: Content, now: float) -> Message | None:
         """Return the base's message for the process; None for one not believed, or handled here."""
@@ -134,7 +134,7 @@ class EndToEndDelivery:
 
     def command(self, command: Command, now: float) -> None:
         """Send an order down the string until its reply comes."""
-        self._orders.keep_payload(command.sequence, encode(command), now)
+        self._orders.keep_payload(command.sequence, encode_message(command), now)
         self._send_orders(now)
 
     def withdraw(self, sequence: int) -> None:
@@ -143,18 +143,18 @@ class EndToEndDelivery:
 
     def send_segment(self, segment: BlockSegment) -> None:
         """Send a part of a parameter block down; the upload repeats what is lost with a relay."""
-        self._send_down(encode(segment), segment.tube, Priority.BLOCK)
+        self._send_down(encode_message(segment), segment.tube, Priority.BLOCK)
 
     def acknowledge(self, message: Kept) -> None:
         """Send a receipt of this message, by its content, to its tube."""
         receipt = Receipt(message.tube, message.sequence, content_of_message(message))
-        self._send_down(encode(receipt), receipt.tube, Priority.COMMAND)
+        self._send_down(encode_message(receipt), receipt.tube, Priority.COMMAND)
 
     def send_offers(self) -> None:
         """Offer sessions to tubes whose seals the base does not know."""
         if self._seals is not None and self._lower is not None:
             for tube, payload in self._seals.due_offers():
-                self._lower.send_best_effort(payload, (Kind.SESSION_OFFER, tube), Priority.COMMAND)
+                self._lower.send_best_effort(payload, (MessageKind.SESSION_OFFER, tube), Priority.COMMAND)
 
     def open_from_tube(self, opened: Opened, payload: Content, now: float) -> Message | None:
         """Return a tube's message for the base; None for one not believed, or an answer to no order."""
@@ -215,7 +215,7 @@ class EndToEndDelivery:
         if seals is None:
             message = decode_opened(opened)
             return None if isinstance(message, SessionOffer) else message
-        if not seals.is_told(bytes(payload), now, is_offer=opened.kind is Kind.SESSION_OFFER):
+        if not seals.is_told(bytes(payload), now, is_offer=opened.kind is MessageKind.SESSION_OFFER):
             return None
         message = decode_opened(opened)
         if not seals.is_of(message, self._address):

@@ -19,28 +19,17 @@ from telemetry.application.place import StringPlace
 from telemetry.application.standstill import Standstill, is_undated
 from telemetry.errors import DecodeError
 from telemetry.media.port import PortFrame, Priority
-from telemetry.messages import (
-    BASE,
-    ENCODER,
-    Aiding,
-    Hello,
-    Message,
-    Mode,
-    NodeState,
-    Side,
-    TimeReply,
-    TimeRequest,
-)
+from telemetry.messages import BASE, ENCODER, Aiding, Hello, Message, NodeMode, NodeState, Side, TimeReply, TimeRequest
 from telemetry.presentation.msgpack_codec import (
     DOWNWARD,
     Opened,
     decode_opened,
-    encode,
+    encode_message,
     open_payload,
     state_origin,
-    unwritten,
+    unwritten_message,
 )
-from telemetry.schema import Kind
+from telemetry.schema import MessageKind
 from telemetry.transport.hop import BUNDLE_LIMIT, HopLink
 from telemetry.unwritten import Content
 
@@ -96,7 +85,7 @@ class Endpoint:
         self.boot_count = boot_count
         self.clock = ClockFilter(is_root=is_clock_root, epoch=boot_count)
         self.counters: Counter[str] = Counter()
-        self.mode = Mode.BOOT
+        self.mode = NodeMode.BOOT
         self.place = StringPlace(address, reach, self.counters)
         self._links = {side: HopLink(address, boot_count, self.place.nearest(side)) for side in sorted(sides)}
         toward_encoder = Side.LOWER if address == BASE else Side.UPPER
@@ -182,7 +171,9 @@ class Endpoint:
             self._send_hello(now if is_news else now + HELLO_WAIT)
         if self._sync_side in self._links and now >= self._sync_at + self._sync_pace():
             self._sync_at = now
-            self._links[self._sync_side].send_best_effort(unwritten(TimeRequest(now)), Kind.TIME_REQUEST, Priority.TIME)
+            self._links[self._sync_side].send_best_effort(
+                unwritten_message(TimeRequest(now)), MessageKind.TIME_REQUEST, Priority.TIME
+            )
         self.mail.send_due(now)
 
     def take_frames(self, now: float) -> list[tuple[Side, PortFrame]]:
@@ -214,7 +205,7 @@ class Endpoint:
         if self.seals is not None and self.address == ENCODER:
             aiding = self.seals.measurement.close(aiding)
         if Side.LOWER in self._links:
-            self._links[Side.LOWER].send_best_effort(unwritten(aiding), Kind.AIDING, Priority.AIDING)
+            self._links[Side.LOWER].send_best_effort(unwritten_message(aiding), MessageKind.AIDING, Priority.AIDING)
             self._links[Side.LOWER].release()
 
     def ask_time(self, now: float) -> None:
@@ -228,8 +219,8 @@ class Endpoint:
             below = self._links.get(Side.LOWER)
             wait = STATE_WAIT + HOP_WAIT * max(WAITING_HOPS - self.place.hops, 0)
             until = now + wait if below is not None and below.is_up(now) else now
-            payload = unwritten(state) if self.seals is None else self.seals.close_up(encode(state))
-            link.send_with_others(payload, (Kind.NODE_STATE, state.tube), Priority.STATE, until)
+            payload = unwritten_message(state) if self.seals is None else self.seals.close_up(encode_message(state))
+            link.send_with_others(payload, (MessageKind.NODE_STATE, state.tube), Priority.STATE, until)
             self.mail.has_states = True
             if until == now:
                 self.mail.go_with_states(now)
@@ -290,7 +281,7 @@ class Endpoint:
                 var = min(clock.variance(now), 1e9)
                 rig_now = clock.rig_from_local(now)
                 reply = TimeReply(message.asked_at, now, now, rig_now, clock.rig_rate, var, clock.epoch)
-                self._links[side].send_best_effort(unwritten(reply), Kind.TIME_REPLY, Priority.TIME)
+                self._links[side].send_best_effort(unwritten_message(reply), MessageKind.TIME_REPLY, Priority.TIME)
             case TimeReply() if side is self._sync_side:
                 self.clock.exchange(message, now)
         return None
@@ -300,9 +291,9 @@ class Endpoint:
             self._hello_at = -math.inf
 
     def _handle_upward(self, opened: Opened, payload: Content, now: float) -> Message | None:
-        if opened.kind is Kind.DEPTH_READING:
+        if opened.kind is MessageKind.DEPTH_READING:
             raise DecodeError("depth reading: expected on its own key")
-        waited = opened.kind is Kind.NODE_STATE and self._standstill.may_have_waited(now)
+        waited = opened.kind is MessageKind.NODE_STATE and self._standstill.may_have_waited(now)
         if waited and is_undated(decode_opened(opened)):
             self.counters["old_states"] += 1
             return None
@@ -322,7 +313,7 @@ class Endpoint:
         link, kind = self._links.get(side), opened.kind
         if link is None:
             self.counters["nowhere_to_go"] += 1
-        elif kind is Kind.NODE_STATE:
+        elif kind is MessageKind.NODE_STATE:
             self._pass_state(opened.origin, payload)
         elif kind in RELIABLE:
             link.send_reliable(bytes(payload), PRIORITIES[kind])
@@ -333,7 +324,7 @@ class Endpoint:
         if (link := self._links.get(Side.UPPER)) is None:
             self.counters["nowhere_to_go"] += 1
             return
-        link.send_best_effort(payload, (Kind.NODE_STATE, tube), Priority.STATE)
+        link.send_best_effort(payload, (MessageKind.NODE_STATE, tube), Priority.STATE)
         self._passes_states = True
 
     @property
@@ -345,7 +336,7 @@ class Endpoint:
     def _send_hello(self, until: float) -> None:
         for link in self._links.values():
             hello = Hello(self.address, self.boot_count, self.place.hops, self.mode, link.quality)
-            link.send_with_others(unwritten(hello), Kind.HELLO, Priority.HELLO, until)
+            link.send_with_others(unwritten_message(hello), MessageKind.HELLO, Priority.HELLO, until)
 
     def _sync_pace(self) -> float:
         return SYNC_QUICK if self.clock.exchanges < SYNC_BURST else SYNC_SLOW

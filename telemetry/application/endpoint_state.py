@@ -8,7 +8,7 @@ import msgpack
 
 from telemetry.errors import DecodeError
 from telemetry.messages import HOPS_UNKNOWN, MAX_TUBE, Event, Message, Severity
-from telemetry.presentation.msgpack_codec import decode
+from telemetry.presentation.msgpack_codec import decode_message
 from telemetry.schema import U53
 
 STATE_LAYOUT = "endpoint-1"  # of what is saved; counted up when it changes
@@ -72,4 +72,4 @@ def _parcel(row: object) -> tuple[int, bytes, bool]:
         raise ValueError(f"expected a number and a payload, got {row!r:.40}")
     if not isinstance(row[1], bytes):
         raise ValueError(f"payload {row[0]}: expected bytes, got {row[1]!r:.40}")
-    return row[0], row[1], is_needed(decode(row[1]))
+    return row[0], row[1], is_needed(decode_message(row[1]))

@@ -7,7 +7,7 @@ from collections import Counter
 from functools import partial
 from typing import NamedTuple
 
-from telemetry.messages import BASE, ENCODER, HOPS_UNKNOWN, MAX_TUBE, Hello, Mode, Side
+from telemetry.messages import BASE, ENCODER, HOPS_UNKNOWN, MAX_TUBE, Hello, NodeMode, Side
 from telemetry.transport.nearest import Nearest
 
 
@@ -17,7 +17,7 @@ class Neighbour(NamedTuple):
     tube: int
     boot_count: int
     hops: int
-    mode: Mode
+    mode: NodeMode
     link_quality: float
     last_heard: float
 

@@ -14,7 +14,7 @@ from telemetry.application.measurement_seal import MeasurementSeal
 from telemetry.errors import KeyFileError
 from telemetry.media.port import PortFrame, Priority
 from telemetry.messages import BASE, Message, NodeState, SessionOffer, Side
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.transport.joint_seal import JointSeal
 from telemetry.transport.key_ring import KeyRing, key_file, read_ring
 
@@ -138,7 +138,7 @@ class Seals:
 
     def due_offers(self) -> list[tuple[int, bytes]]:
         """Sealed offers of sessions that are due, each with its tube."""
-        return [] if self.base is None else self.base.due_offers(lambda tube: encode(SessionOffer(tube)))
+        return [] if self.base is None else self.base.due_offers(lambda tube: encode_message(SessionOffer(tube)))
 
     def next_wake(self) -> float:
         """Time (s) at which ``frames_of`` has something to send by itself, infinite if never."""

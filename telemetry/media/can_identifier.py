@@ -10,7 +10,8 @@ from typing import NamedTuple
 from telemetry.media.port import Priority
 
 EVERYBODY = 255
-# types of the message kinds are their numbers (``telemetry.schema.Kind``); those of the medium itself stand above
+# types of the message kinds are their numbers (``telemetry.schema.MessageKind``); those of the medium itself stand
+# above
 PRESENCE, FLOW_CONTROL, TUNNEL = 29, 30, 31
 PART_MASK = 0x1F
 SOURCE_SHIFT = 13

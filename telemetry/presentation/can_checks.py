@@ -7,13 +7,13 @@ from functools import partial
 from typing import Any
 
 from telemetry.quantities import Quantity, ValueKind, check_binary, check_boolean, check_integer, check_number
-from telemetry.schema import Field
+from telemetry.schema import MessageField
 
 Check = Callable[[Any], Any]  # raises ValueError
 QUICK: dict[ValueKind, type[Any]] = {ValueKind.NUMBER: float, ValueKind.INTEGER: int}
 
 
-def check_of(field: Field) -> Check:
+def check_of(field: MessageField) -> Check:
     """Check of one line of the schema."""
     check: Check = partial(CHECKS[field.kind], field)
     if field.enumeration is not None:

@@ -13,13 +13,13 @@ from typing import Any
 
 from telemetry.presentation.can_checks import Check, check_of
 from telemetry.presentation.can_signals import Scale, Signal
-from telemetry.schema import Field
+from telemetry.schema import MessageField
 
 Encoder = Callable[[Any], tuple[int, ...]]  # of a field's value; raises ValueError
 Decoder = Callable[[int], Any]  # of one signal's raw number; raises ValueError
 
 
-def encoder_of(field: Field, signals: list[Signal]) -> Encoder:
+def encoder_of(field: MessageField, signals: list[Signal]) -> Encoder:
     """Function from a field's value to the raw numbers of its signals."""
     check, first = check_of(field), signals[0]
     if len(signals) == 3:
@@ -92,7 +92,7 @@ def bytes_encoder(check: Check) -> Encoder:
     return raws_of
 
 
-def decoder_of(field: Field, signal: Signal) -> Decoder:
+def decoder_of(field: MessageField, signal: Signal) -> Decoder:
     """Function from a raw number to the value it stands for, or to the component of the vector."""
     first = signal.first
     check = check_of(field) if signal.name == field.name else component_check(check_of(field))

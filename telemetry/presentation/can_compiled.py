@@ -16,7 +16,7 @@ from telemetry.presentation.can_coders import levels_of, parts_of_one
 from telemetry.presentation.can_forms import Form
 from telemetry.presentation.can_signals import COUNT, ON_STEP, Scale, Signal
 from telemetry.quantities import ValueKind
-from telemetry.schema import Field
+from telemetry.schema import MessageField
 
 Packer = Callable[[Sequence[Any], int], list[bytes] | None]  # data of each frame of the values of all fields, a count
 Unpacker = Callable[[Sequence[bytes]], list[Any] | None]  # values of all fields; raises ValueError
@@ -37,7 +37,9 @@ class Rounded(NamedTuple):
     variance: int
 
 
-def packer_of(fields: Sequence[tuple[Field, Sequence[Signal]]], rounded: Sequence[Rounded], form: Form) -> Packer:
+def packer_of(
+    fields: Sequence[tuple[MessageField, Sequence[Signal]]], rounded: Sequence[Rounded], form: Form
+) -> Packer:
     """Function from the values of all fields to the data of the frames of ``form``.
 
     ``fields`` have their signals; those that no signal says come last.
@@ -64,7 +66,7 @@ def packer_of(fields: Sequence[tuple[Field, Sequence[Signal]]], rounded: Sequenc
     return packer
 
 
-def unpacker_of(fields: Sequence[tuple[Field, Sequence[Signal]]], form: Form) -> Unpacker:
+def unpacker_of(fields: Sequence[tuple[MessageField, Sequence[Signal]]], form: Form) -> Unpacker:
     """Function from the data of the frames of ``form`` to the values of all fields, see ``packer_of``."""
     lines = [f"{' '.join(f'd{frame},' for frame in range(len(form.layouts)))} = frames"]
     for frame, layout in enumerate(form.layouts):
@@ -90,7 +92,7 @@ def unpacker_of(fields: Sequence[tuple[Field, Sequence[Signal]]], form: Form) ->
     return unpacker
 
 
-def guard_lines(v: str, field: Field, signals: Sequence[Signal]) -> list[str]:
+def guard_lines(v: str, field: MessageField, signals: Sequence[Signal]) -> list[str]:
     """Lines that give up where a value needs a check, or is beyond its signal."""
     if not signals:
         return [f"if {v} != {field.before!r}:", OTHERWISE]
@@ -154,7 +156,7 @@ def raw_lines(raw: str, v: str, signal: Signal, added: Sequence[str], steps: str
     ]
 
 
-def value_lines(name: str, place: int, field: Field, signal: Signal, space: dict[str, Any]) -> list[str]:
+def value_lines(name: str, place: int, field: MessageField, signal: Signal, space: dict[str, Any]) -> list[str]:
     """Lines that make a value, or the part of one, of ``raw``."""
     match signal.scale:
         case Scale.DECIBEL:
@@ -174,7 +176,7 @@ def value_lines(name: str, place: int, field: Field, signal: Signal, space: dict
     return [f"{name} = {unless}{scaled}", *within_lines(name, field)]
 
 
-def within_lines(name: str, field: Field) -> list[str]:
+def within_lines(name: str, field: MessageField) -> list[str]:
     """Lines that give up where a value is outside the range of the schema."""
     low = -field.high if field.kind is ValueKind.VECTOR else field.low
     return [f"if not {low!r} <= {name} <= {field.high!r}:", OTHERWISE]

@@ -31,19 +31,19 @@ def dbc_text() -> str:
     """The file: every message in its frame of CAN FD and in those of classic CAN."""
     blocks = [HEAD.format(node=NODE)]
     comments, formats, values = [], [], []
-    for native, layout, is_fd in layouts():
+    for native, layout, is_fd in frame_layouts():
         identifier = EXTENDED | identifier_of(native, layout)
         lines = [f"BO_ {identifier} {layout.name}: {layout.length} {NODE}"]
         lines += [signal_line(signal, start) for signal, start in layout.places]
         blocks.append("\n".join(lines) + "\n")
         kind = EXTENDED_CAN_FD if is_fd else EXTENDED_CAN
         formats.append(f'BA_ "VFrameFormat" BO_ {identifier} {kind};\n')
-        comments += [f'CM_ SG_ {identifier} {s.name} "{meaning(native, s)}";\n' for s, _ in layout.places]
+        comments += [f'CM_ SG_ {identifier} {s.name} "{signal_meaning(native, s)}";\n' for s, _ in layout.places]
         values += [line for s, _ in layout.places if (line := value_line(native, identifier, s))]
     return "\n".join(blocks) + "\n" + "".join([*comments, ATTRIBUTES, *formats, *values])
 
 
-def layouts() -> Iterator[tuple[NativeMessage, Layout, bool]]:
+def frame_layouts() -> Iterator[tuple[NativeMessage, Layout, bool]]:
     """Every frame, and whether it is one of CAN FD."""
     for native in NATIVE.values():
         for form in (native.fd, native.classic):
@@ -63,7 +63,7 @@ def signal_line(signal: Signal, start: int) -> str:
     return f' SG_ {signal.name} : {start}|{signal.bits}@1+ {scale} "{signal.unit}" Vector__XXX'
 
 
-def meaning(native: NativeMessage, signal: Signal) -> str:
+def signal_meaning(native: NativeMessage, signal: Signal) -> str:
     """What a signal means, in the schema's words."""
     if signal is COUNT:
         return "frames of the link so far, modulo 256; the same in all parts of one message"
@@ -83,11 +83,11 @@ def value_line(native: NativeMessage, identifier: int, signal: Signal) -> str:
     return f"VAL_ {identifier} {signal.name} {names} ;\n"
 
 
-def differences(database: Any) -> list[str]:
+def database_differences(database: Any) -> list[str]:
     """Where a database that cantools has read differs from our messages: message and signal, expected, got."""
     found = []
     theirs = {message.name: message for message in database.messages}
-    for native, layout, is_fd in layouts():
+    for native, layout, is_fd in frame_layouts():
         other = theirs.get(layout.name)
         if other is None:
             found.append(f"{layout.name}: missing")

@@ -64,7 +64,7 @@ class Form:
         return [bits[frame] >> start & largest for frame, start, largest in self.places]
 
 
-def groups(signals: list[Signal], bits: int) -> list[list[Signal]]:
+def frame_groups(signals: list[Signal], bits: int) -> list[list[Signal]]:
     """Signals put into frames with room for ``bits``: each into the first that has room."""
     filled: list[list[Signal]] = []
     for signal in signals:

@@ -17,19 +17,25 @@ from telemetry.media.can_timing import CLASSIC_LARGEST, FD_LARGEST
 from telemetry.messages import Message
 from telemetry.presentation.can_coders import decoder_of, encoder_of, number_encoder
 from telemetry.presentation.can_compiled import Packer, Rounded, Unpacker, packer_of, unpacker_of
-from telemetry.presentation.can_forms import FD_PART, Form, Layout, groups, laid_out
+from telemetry.presentation.can_forms import FD_PART, Form, Layout, frame_groups, laid_out
 from telemetry.presentation.can_signals import COUNT_BITS, ON_STEP, Signal, signals_of
-from telemetry.schema import SCHEMA, Field, Kind, MessageSpec
+from telemetry.schema import SCHEMA, MessageField, MessageKind, MessageSpec
 
 # no signals: a wired joint has no radio, and what is sealed goes as it is, by ISO-TP
 UNSAID = {"upper_margin": "where there is no radio", "lower_margin": "where there is no radio", "seal": "as signals"}
-CYCLIC = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY, Kind.NODE_STATE)
+CYCLIC = (
+    MessageKind.AIDING,
+    MessageKind.HELLO,
+    MessageKind.TIME_REQUEST,
+    MessageKind.TIME_REPLY,
+    MessageKind.NODE_STATE,
+)
 # of an aiding, the encoder's measurement goes on unchanged and each relay writes the path anew
 PATH = ("systematic_var", "offset", "hops", "torsion_var")
 ROUNDED_INTO = {
-    Kind.AIDING: (("yaw", "", "yaw_var"), ("offset", "", "systematic_var"), ("valid_at", "rate", "yaw_var")),
-    Kind.TIME_REPLY: (("rig_at", "", "clock_var"),),
-    Kind.NODE_STATE: (("yaw", "", "yaw_var"), ("innovation", "", "innovation_var")),
+    MessageKind.AIDING: (("yaw", "", "yaw_var"), ("offset", "", "systematic_var"), ("valid_at", "rate", "yaw_var")),
+    MessageKind.TIME_REPLY: (("rig_at", "", "clock_var"),),
+    MessageKind.NODE_STATE: (("yaw", "", "yaw_var"), ("innovation", "", "innovation_var")),
 }  # whose rounding, times which rate, is in which variance
 Gather = Callable[[Sequence[Any]], Any]
 
@@ -87,7 +93,7 @@ class NativeMessage:
         everything = list(self.signals.values())
         self.fd = Form((laid_out(self.name, FD_PART, everything, FD_LARGEST),), everything)
         self.classic = Form(self._classic_layouts(), everything)
-        self._by_field: list[tuple[Field, list[Signal]]] = [
+        self._by_field: list[tuple[MessageField, list[Signal]]] = [
             *by_field,
             *((spec.fields[k], []) for k, _, _ in self._unsaid),
         ]
@@ -182,12 +188,12 @@ class NativeMessage:
 
     def _classic_layouts(self) -> tuple[Layout, ...]:
         """Frames of 8 bytes; of an aiding the measurement's before the path's."""
-        path = [s for s in self.signals.values() if self.kind is Kind.AIDING and s.name in PATH]
+        path = [s for s in self.signals.values() if self.kind is MessageKind.AIDING and s.name in PATH]
         first = [s for s in self.signals.values() if s not in path]
         halves = [("Measurement", first), ("Path", path)] if path else [("", first)]
         layouts: list[Layout] = []
         for half, signals in halves:
-            for number, group in enumerate(groups(signals, 8 * CLASSIC_LARGEST - COUNT_BITS), 1):
+            for number, group in enumerate(frame_groups(signals, 8 * CLASSIC_LARGEST - COUNT_BITS), 1):
                 layouts.append(laid_out(f"{self.name}{half}{number}", len(layouts), group, CLASSIC_LARGEST))
         return tuple(layouts)
 
@@ -198,14 +204,14 @@ def gathers_of(counts: list[int]) -> list[Gather]:
     begin = 0
     for count in counts:
         places = range(begin, begin + count)
-        gathers.append(partial(joined, itemgetter(*places)) if count == 2 else itemgetter(*places))
+        gathers.append(partial(join_halves, itemgetter(*places)) if count == 2 else itemgetter(*places))
         begin += count
     return gathers
 
 
-def joined(halves: Gather, values: Sequence[Any]) -> Any:
+def join_halves(halves: Gather, values: Sequence[Any]) -> Any:
     """Bytes of the two signals that hold them."""
     return add(*halves(values))
 
 
-NATIVE: dict[Kind, NativeMessage] = {spec.kind: NativeMessage(spec) for spec in SCHEMA if spec.kind in CYCLIC}
+NATIVE: dict[MessageKind, NativeMessage] = {spec.kind: NativeMessage(spec) for spec in SCHEMA if spec.kind in CYCLIC}

@@ -25,16 +25,16 @@ from telemetry.presentation.msgpack_codec import (
     values_of_opened,
     write_payload,
 )
-from telemetry.schema import SPEC_OF, Kind
+from telemetry.schema import SPEC_OF, MessageKind
 from telemetry.transport.hop import Header, LinkFrame, pack_frame, parse_frame
 from telemetry.unwritten import Content
 
 PRIORITIES = {
-    Kind.TIME_REQUEST: Priority.TIME,
-    Kind.TIME_REPLY: Priority.TIME,
-    Kind.AIDING: Priority.AIDING,
-    Kind.HELLO: Priority.HELLO,
-    Kind.NODE_STATE: Priority.STATE,
+    MessageKind.TIME_REQUEST: Priority.TIME,
+    MessageKind.TIME_REPLY: Priority.TIME,
+    MessageKind.AIDING: Priority.AIDING,
+    MessageKind.HELLO: Priority.HELLO,
+    MessageKind.NODE_STATE: Priority.STATE,
 }
 HEADER_EVERY = 2.0  # s, after which an end that has lost it, or started anew, is told again
 BY_TYPE = {int(kind): native for kind, native in NATIVE.items()}
@@ -152,7 +152,7 @@ def native_parts(payload: Content, count: int, *, fd: bool) -> list[NativePart] 
     return list(map(NativePart, HEADS[native.kind][fd], frames))
 
 
-def rounded(message: Message) -> Message:
+def rounded_message(message: Message) -> Message:
     """What arrives of a message: itself, its values on the steps of their signals."""
     native = NATIVE.get(SPEC_OF[type(message)].kind)
     if native is None:

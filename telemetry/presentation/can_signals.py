@@ -13,7 +13,7 @@ from typing import Any
 
 from telemetry.errors import EncodeError
 from telemetry.quantities import ValueKind
-from telemetry.schema import TIME_STEP, TURN, Field
+from telemetry.schema import TIME_STEP, TURN, MessageField
 
 COUNT_BITS = 8
 VARIANCE_BITS, WIDE_VARIANCE_BITS = 8, 9  # of rad^2, and of s^2 with its many powers of ten
@@ -111,7 +111,7 @@ class Signal:
 COUNT = Signal("count", "1", COUNT_BITS, Scale.INTEGER)
 
 
-def signals_of(field: Field) -> list[Signal]:
+def signals_of(field: MessageField) -> list[Signal]:
     """Signals of one field of the schema: three of a vector, two of eight bytes.
 
     Raises
@@ -134,7 +134,7 @@ def signals_of(field: Field) -> list[Signal]:
     raise ValueError(f"{field.name}: expected a field of a cyclic message, got {field.kind.value}")
 
 
-def _number(field: Field) -> Signal:
+def _number(field: MessageField) -> Signal:
     if field.step_db:
         bits = VARIANCE_BITS if field.high <= 1e3 else WIDE_VARIANCE_BITS
         first = round(10.0 * math.log10(field.high) / field.step_db) - (1 << bits) + 1
@@ -156,5 +156,5 @@ def _linear(name: str, unit: str, limit: float, step: float) -> Signal:
     return Signal(name, unit, bits, Scale.LINEAR, -(1 << bits - 1), step)
 
 
-def _integer(field: Field, high: int) -> Signal:
+def _integer(field: MessageField, high: int) -> Signal:
     return Signal(field.name, "1", (high - int(field.low)).bit_length(), Scale.INTEGER, int(field.low))

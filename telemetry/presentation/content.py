@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 
 from telemetry.messages import CONTENT_SIZE, Message
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 
 
 def content_of(payload: bytes) -> bytes:
@@ -15,4 +15,4 @@ def content_of(payload: bytes) -> bytes:
 
 def content_of_message(message: Message) -> bytes:
     """Hash of the payload of a message; a message has one payload only."""
-    return content_of(encode(message))
+    return content_of(encode_message(message))

@@ -17,7 +17,7 @@ from telemetry.errors import DecodeError, EncodeError
 from telemetry.messages import ImuMean, Message, Stand
 from telemetry.presentation.wire_structs import struct_of
 from telemetry.quantities import ValueKind
-from telemetry.schema import SCHEMA, Field, MessageSpec
+from telemetry.schema import SCHEMA, MessageField, MessageSpec
 
 Values: TypeAlias = Sequence[Any]
 # the field that msgspec refuses, in what it says
@@ -110,7 +110,7 @@ def check_of_values(spec: MessageSpec) -> Callable[[Values], Struct]:
     return partial(convert, **options)
 
 
-def maker_of(field: Field) -> Callable[[Any], Any] | None:
+def maker_of(field: MessageField) -> Callable[[Any], Any] | None:
     """Function from what comes on the wire to a value of the message, where that is another one."""
     if field.enumeration is not None and issubclass(field.enumeration, enum.Flag):
         return cache(field.enumeration)  # no more numbers than the range of the field has

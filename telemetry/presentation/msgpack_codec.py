@@ -14,13 +14,13 @@ from msgspec.msgpack import Decoder, Encoder
 from telemetry.errors import DecodeError
 from telemetry.messages import BASE, SCHEMA_VERSION, Message
 from telemetry.presentation.message_codec import CODEC_OF, CODECS, REFUSED, MessageCodec, Values, name_refusal
-from telemetry.schema import U53, Kind
+from telemetry.schema import U53, MessageKind
 from telemetry.unwritten import Content, Unwritten
 
 MAX_PAYLOAD = 4096
 HIGHEST_ADDRESS = 255
 NO_TARGET = 255
-DOWNWARD = (Kind.RECEIPT, Kind.COMMAND, Kind.BLOCK_SEGMENT, Kind.SESSION_OFFER)
+DOWNWARD = (MessageKind.RECEIPT, MessageKind.COMMAND, MessageKind.BLOCK_SEGMENT, MessageKind.SESSION_OFFER)
 KEYS = {"version": "v", "kind": "k", "origin": "o", "target": "t", "sequence": "s", "body": "b"}
 NAMES = {key: name for name, key in KEYS.items()}
 Address: TypeAlias = Annotated[int, Meta(ge=0, le=HIGHEST_ADDRESS)]
@@ -34,7 +34,7 @@ class Envelope(Struct, Generic[Body], rename=KEYS):
     """
 
     version: Annotated[int, Meta(ge=1, le=SCHEMA_VERSION)]
-    kind: Kind
+    kind: MessageKind
     origin: Address
     target: Address
     sequence: Annotated[int, Meta(ge=0, le=U53)]
@@ -61,7 +61,7 @@ class UnwrittenMessage(Unwritten):
         return MAX_PAYLOAD
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> MessageKind:
         """Kind of the message."""
         return self.codec.kind
 
@@ -75,7 +75,7 @@ class UnwrittenMessage(Unwritten):
         return write_payload(self.codec, self.values)
 
 
-def encode(message: Message) -> bytes:
+def encode_message(message: Message) -> bytes:
     """Payload of a message, in the earliest schema version that can express it.
 
     Raises
@@ -87,7 +87,7 @@ def encode(message: Message) -> bytes:
     return write_payload(codec, codec.values_of(message))
 
 
-def unwritten(message: Message) -> UnwrittenMessage:
+def unwritten_message(message: Message) -> UnwrittenMessage:
     """Message as it will be written, in the earliest schema version that can express it.
 
     Raises
@@ -113,7 +113,7 @@ def write_payload(codec: MessageCodec, values: Values) -> bytes:
     return ENCODER.encode(envelope_of(codec, version, values, body))
 
 
-def decode(payload: Content) -> Message:
+def decode_message(payload: Content) -> Message:
     """Message of a payload.
 
     Raises
@@ -183,16 +183,16 @@ def state_origin(payload: Content) -> int | None:
             return payload[STATE_HEAD + 1]
         return origin if origin <= HIGHEST_FIXINT else None
     opened = payload.opened() if isinstance(payload, UnwrittenMessage) else None
-    return opened.origin if opened is not None and opened.kind is Kind.NODE_STATE else None
+    return opened.origin if opened is not None and opened.kind is MessageKind.NODE_STATE else None
 
 
 def _state_head(version: int) -> bytes:
     """First bytes of a node state, up to the key of its tube."""
     key = ENCODER.encode(KEYS["origin"])
-    head, _, _ = ENCODER.encode(Envelope(version, Kind.NODE_STATE, 0, 0, 0, {})).partition(key)
+    head, _, _ = ENCODER.encode(Envelope(version, MessageKind.NODE_STATE, 0, 0, 0, {})).partition(key)
     return head + key
 
 
-STATE_HEADS = frozenset(map(_state_head, range(1, CODEC_OF[Kind.NODE_STATE].newest + 1)))
+STATE_HEADS = frozenset(map(_state_head, range(1, CODEC_OF[MessageKind.NODE_STATE].newest + 1)))
 (STATE_HEAD,) = set(map(len, STATE_HEADS))
 UINT8, HIGHEST_FIXINT = 0xCC, 0x7F  # of msgpack

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 from msgspec import Meta, Struct, defstruct
 
 from telemetry.quantities import MAX_ARGUMENTS, MAX_IMUS, MAX_LIST, MAX_STANDS, MAX_TEXT, ValueKind
-from telemetry.schema import LARGEST_TIME, MAX_EPOCH, Field, MessageSpec
+from telemetry.schema import LARGEST_TIME, MAX_EPOCH, MessageField, MessageSpec
 
 LARGEST_COVARIANCE, LARGEST_FORCE = 1e6, 1e3  # (m/s^2)^2 and the like, m/s^2
 LARGEST = sys.float_info.max
@@ -38,7 +38,7 @@ def struct_of(spec: MessageSpec, version: int, *, as_list: bool = False) -> type
     )
 
 
-def type_of(field: Field) -> Any:
+def type_of(field: MessageField) -> Any:
     """Type of one field: what msgspec is to find in its place."""
     return TYPES[field.kind](field)
 
@@ -57,14 +57,14 @@ def number_type(low: float = -LARGEST, high: float = LARGEST) -> Any:
     return Annotated[float, Meta(ge=ends[0], le=ends[1])]
 
 
-def integer_type(field: Field) -> Any:
+def integer_type(field: MessageField) -> Any:
     """An integer in the range of a field, or a member of its enumeration; flags come as their number."""
     if field.enumeration is not None and not issubclass(field.enumeration, enum.Flag):
         return field.enumeration
     return Annotated[int, Meta(ge=int(field.low), le=int(field.high))]
 
 
-def binary_type(field: Field) -> Any:
+def binary_type(field: MessageField) -> Any:
     """Bytes, as many as the range of a field says."""
     return Annotated[bytes, Meta(min_length=int(field.low), max_length=int(field.high))]
 
@@ -85,7 +85,7 @@ def names_type(values: Any) -> Any:
     return limited_type(DICT[TEXT, values], MAX_ARGUMENTS)
 
 
-def stands_type(field: Field) -> Any:
+def stands_type(field: MessageField) -> Any:
     """Stands of the bit: epoch, begin, end and depth, the end not before the begin."""
     stand = defstruct(
         "StandOnWire",
@@ -133,7 +133,7 @@ IMU = defstruct(
     array_like=True,
     forbid_unknown_fields=True,
 )
-TYPES: dict[ValueKind, Callable[[Field], Any]] = {
+TYPES: dict[ValueKind, Callable[[MessageField], Any]] = {
     ValueKind.NUMBER: lambda field: number_type(field.low, field.high),
     ValueKind.INTEGER: integer_type,
     ValueKind.BOOLEAN: lambda _: bool,

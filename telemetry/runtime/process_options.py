@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,6 +16,9 @@ from telemetry.media.credentials import needs_tls
 from telemetry.media.media_table import check_medium
 from telemetry.messages import BASE, ENCODER, MAX_TUBE, Side, address_name
 from telemetry.runtime.command_line import InputFault
+
+if TYPE_CHECKING:
+    from telemetry.runtime.hosting import OwnTime, Place
 
 INSECURE = "borechain.insecure"  # in the context of a command
 
@@ -117,6 +121,26 @@ def place_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+@dataclass(frozen=True, slots=True)
+class PlaceRequest:
+    """Where a process finds its rig, as its options say."""
+
+    rig_name: str
+    endpoint: str
+    folder: Path
+    key_file: Path | None = None
+    keys_place: Path | None = None
+    upper: str | None = None
+    lower: str | None = None
+
+    def to_place(self) -> Place:
+        """The place; InputFault for two kinds of keys."""
+        from telemetry.runtime.hosting import Place, chosen_media
+
+        media = chosen_media({Side.UPPER: self.upper, Side.LOWER: self.lower})
+        return Place(self.rig_name, self.endpoint, self.folder, self.key_file, media, keys=self.keys_place)
+
+
 key_option = click.option(
     "--key-file",
     type=click.Path(path_type=Path, dir_okay=False),
@@ -211,3 +235,23 @@ def own_neighbours(
             option, end = ("--above", "--upper") if side is Side.UPPER else ("--below", "--lower")
             raise InputFault(f"{end} {medium}: expected {option} with it; only on CAN a neighbour is found")
     return {side: joined.get(side) for side in ends if side in joined or side in chosen}
+
+
+@dataclass(frozen=True, slots=True)
+class EndsRequest:
+    """Clock of a process, and who is at its ends on which medium, as its options say."""
+
+    clock: str
+    above: int | None
+    below: int | None
+    upper: str | None
+    lower: str | None
+
+    def to_own_time(self, address: int, sensor: tuple[str, str | tuple[str, ...] | None]) -> OwnTime | None:
+        """Settings of a process with a clock of its own; arguments and errors as ``own_neighbours``."""
+        from telemetry.runtime.hosting import OwnTime
+
+        ends = {Side.UPPER: self.above, Side.LOWER: self.below}
+        media = {Side.UPPER: self.upper, Side.LOWER: self.lower}
+        neighbours = own_neighbours(self.clock, address, sensor, ends, media)
+        return None if neighbours is None else OwnTime(neighbours)

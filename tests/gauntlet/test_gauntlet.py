@@ -16,7 +16,7 @@ from borechain.gauntlet.gauntlet_run import ALL, USUAL, judge_seed, run_seed
 from sim.gauntlet.fault_kinds import KINDS
 from sim.gauntlet.faulty_world import MINUTE, FaultyWorld
 from sim.gauntlet.plan import drawn_kinds, steps_of
-from sim.world.streams import stream
+from sim.world.random_streams import random_stream
 from telemetry.messages import BASE, ENCODER
 
 COMBINED, PARTS = 300, 2  # seeds in all, and tests that share those of a world; `make study` runs thousands
@@ -26,7 +26,7 @@ def test_every_kind_has_a_name_of_its_own_and_draws_steps_in_its_time() -> None:
     assert len({kind.name for kind in KINDS}) == len(KINDS)
     for n, kind in enumerate(KINDS):
         for seed in range(20):
-            steps = kind.draw(stream(seed, n), 1000.0, 1200.0)
+            steps = kind.draw(random_stream(seed, n), 1000.0, 1200.0)
             assert steps
             assert all(1000.0 <= step.at <= 1200.0 for step in steps)
 

@@ -11,12 +11,14 @@ import pytest
 from borechain.gauntlet import gauntlet_rig
 from borechain.gauntlet.gauntlet_run import run_seed, shrink_outcome
 from groundstation.errors import StoreError
-from groundstation.service.answers import model as model_module
 from groundstation.service.disk import database
-from groundstation.service.disk.ground_store import Stored
-from groundstation.service.disk.keeper import Keeper
+from groundstation.service.disk.keeper import StringKeeper
+from groundstation.service.hole import placement as placement_module
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.learner import Learner
+from groundstation.service.string import known_string as string_module
+from groundstation.service.string.depth import DepthLog
+from groundstation.service.string.stored import Stored
 from groundstation.survey.fusion.survey_trust import Trust
 from node.firmware.tube_settings import TubeSettings
 from node.process import counter as counter_module
@@ -27,18 +29,8 @@ from telemetry.application.clock import ClockFilter
 from telemetry.application.end_to_end import EndToEndDelivery
 from telemetry.application.order_answers import KEPT, Answers
 from telemetry.application.outbox import LIMIT, Outbox, Parcel
-from telemetry.messages import (
-    BASE,
-    ENCODER,
-    Command,
-    Hello,
-    Mode,
-    Receipt,
-    Reply,
-    Side,
-    TimeReply,
-)
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.messages import BASE, ENCODER, Command, Hello, NodeMode, Receipt, Reply, Side, TimeReply
+from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.runtime.disk import Disk
 from telemetry.transport import hop as hop_module
 from telemetry.transport.hop import HopLink
@@ -66,16 +58,17 @@ def seeds(*kinds: str, first: int = 1, count: int = 12) -> Found:
 
 
 def no_depth_bracket(patch: pytest.MonkeyPatch) -> None:
-    def last_before(log: model_module.DepthLog, epoch: int, time: float) -> float | None:
+    def last_before(log: DepthLog, epoch: int, time: float) -> float | None:
         track = log._tracks.get(epoch)
         before = [md for at, md in zip(track.at, track.md, strict=True) if at <= time] if track is not None else []
         return before[-1] if before else None
 
-    patch.setattr(model_module.DepthLog, "at", last_before)
+    patch.setattr(DepthLog, "at", last_before)
 
 
 def flags_ignored(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(model_module, "trust_of", lambda flags: max(Trust.FULL, Trust.UNDATED * bool(flags & 32)))
+    for module in (placement_module, string_module):
+        patch.setattr(module, "trust_of", lambda flags: max(Trust.FULL, Trust.UNDATED * bool(flags & 32)))
 
 
 def receipt_before_the_store(patch: pytest.MonkeyPatch) -> None:
@@ -102,13 +95,13 @@ def refused_and_receipted(patch: pytest.MonkeyPatch) -> None:
 
 
 def synchronous_below_full(patch: pytest.MonkeyPatch) -> None:
-    plain = database._durable
+    plain = database._make_durable
 
     def not_durable(connection: object, record: object) -> None:
         plain(connection, record)  # type: ignore[arg-type]
         connection.execute("PRAGMA synchronous=NORMAL")  # type: ignore[attr-defined]
 
-    patch.setattr(database, "_durable", not_durable)
+    patch.setattr(database, "_make_durable", not_durable)
 
 
 def boots_not_forced(patch: pytest.MonkeyPatch) -> None:
@@ -123,7 +116,7 @@ def boots_not_forced(patch: pytest.MonkeyPatch) -> None:
 
 
 def order_of_string_not_kept(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Keeper, "keep_tally", lambda keeper: None)
+    patch.setattr(StringKeeper, "keep_tally", lambda keeper: None)
 
 
 def receipt_by_number(patch: pytest.MonkeyPatch) -> None:
@@ -181,8 +174,8 @@ def order(process: TubeProcess, number: int) -> None:
     """Order a tube something from a neighbour above."""
     link = HopLink(ENCODER, 1)
     link.last_heard = math.inf
-    link.send_best_effort(encode(Hello(ENCODER, 1, 0, Mode.BOOT, 1.0)), "hello")
-    link.send_best_effort(encode(Command(1, number, "parameters", {})), "command")
+    link.send_best_effort(encode_message(Hello(ENCODER, 1, 0, NodeMode.BOOT, 1.0)), "hello")
+    link.send_best_effort(encode_message(Command(1, number, "parameters", {})), "command")
     for frame in link.take_frames(0.0):
         process.on_frame(Side.UPPER, frame.payload, 0.0)
 
@@ -234,7 +227,7 @@ def a_receipt_of_other_content_settles_nothing(folder: Path) -> str:
     link = HopLink(ENCODER, 1)
     link.last_heard = math.inf
     for number in range(1, 10):
-        link.send_best_effort(encode(Receipt(1, number, b"\1" * 16)), number)
+        link.send_best_effort(encode_message(Receipt(1, number, b"\1" * 16)), number)
     before = endpoint.mail.outbox_size
     for frame in link.take_frames(0.0):
         process.on_frame(Side.UPPER, frame.payload, 0.0)
@@ -247,11 +240,11 @@ def the_order_of_the_string_outlives_the_ground_station(folder: Path) -> str:
     gauntlet_rig.started_world.cache_clear()
     rig.scheduler.advance(rig.world.begin + gauntlet_rig.RESTED + 10.0)
     assert rig.ground is not None
-    before = list(rig.ground.model.tally.tubes)
+    before = list(rig.ground.model.string.tally.tubes)
     rig.disk(BASE).cut()
     rig.cut(BASE)
     rig.start(BASE)
-    after = rig.ground.model.tally.tubes
+    after = rig.ground.model.string.tally.tubes
     rig.close()
     return "" if after == before == [2, 1] else f"{before} before, {after} after"
 

@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from borechain.cli.rig.ground_settings import ground_settings
 from borechain.gauntlet.gauntlet_rig import GauntletRig
 from borechain.gauntlet.oracles import Observer
 from sim.gauntlet.fault import Step
 from sim.gauntlet.faulty_disk import FaultyDisk
 from sim.gauntlet.faulty_world import FaultyWorld
+from sim.rig.ground_settings import ground_settings
+from sim.world.random_streams import random_stream
 from sim.world.scenario import load_scenario
 from sim.world.shipped import find_scenario
-from sim.world.streams import stream
 from telemetry.messages import BASE, ENCODER
 
 SEED, GROUND_KILLS, OTHER_KILLS = 1, 20, 2
@@ -24,7 +24,7 @@ def drilled(folder: Path, *, killed: bool) -> tuple[GauntletRig, Observer]:
     folder.mkdir()
     world = FaultyWorld(load_scenario(find_scenario(Path("wellbore-1"))), SEED)
     tubes = range(1, world.scenario.tubes + 1)
-    disks = {address: FaultyDisk(stream(SEED, 1, address)) for address in (BASE, ENCODER, *tubes)}
+    disks = {address: FaultyDisk(random_stream(SEED, 1, address)) for address in (BASE, ENCODER, *tubes)}
     rig = GauntletRig(world, disks, ground_settings(world), SEED, folder)
     rig.begin(world.begin)
     observer = Observer(rig, world.begin)

@@ -10,8 +10,8 @@ from groundstation.config import GroundConfig
 from groundstation.service.process.ground_process import GroundProcess
 from telemetry.application.depth_source import DepthSource
 from telemetry.application.endpoint import Endpoint
-from telemetry.messages import ImuMean, Mode, NodeFlag, NodeState, Side, SurveyMeasurement
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.messages import ImuMean, NodeFlag, NodeMode, NodeState, Side, SurveyMeasurement
+from telemetry.presentation.msgpack_codec import encode_message
 
 VAR = (0.0034**2) / 32
 CALIBRATED = {"accelerometer_bias_std_deg": 0.002}
@@ -55,7 +55,7 @@ class Rig:
 
     def read_depth(self, md: float) -> None:
         self.md = md
-        self.ground.on_depth(encode(self.source.measure(self.now, md)), self.now)
+        self.ground.on_depth(encode_message(self.source.measure(self.now, md)), self.now)
 
     def alarms(self) -> set[str]:
         """Kinds of alarms that an operator sees."""
@@ -68,7 +68,7 @@ class Rig:
     def tell(self, tube: int, hops: int, scale: float = 0.0) -> None:
         self.hops[tube] = hops
         state = NodeState(
-            tube, self.now, hops, Mode.TRACKING, 1.0, 1e-6, 1e-6, (0.0, 0.0, 0.0), scale, 0.0, 1e-6, 0.1, 1e-8,
+            tube, self.now, hops, NodeMode.TRACKING, 1.0, 1e-6, 1e-6, (0.0, 0.0, 0.0), scale, 0.0, 1e-6, 0.1, 1e-8,
             NodeFlag.NONE, 5, 0,
         )  # fmt: skip
         self.tube.send_state(state, self.now)

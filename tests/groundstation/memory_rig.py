@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.config import GroundConfig
-from groundstation.service.orders.order_book import Order
+from groundstation.service.orders.order_book import SentOrder
 from groundstation.service.process.ground_process import GroundProcess
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.tube_settings import TubeSettings
@@ -138,7 +138,7 @@ class Rig:
         assert order.ended
         return next(status for status in reversed(self.said) if status.sequence == order.number)
 
-    def order(self, tube: int, name: str, **arguments: float | str) -> Order:
+    def order(self, tube: int, name: str, **arguments: float | str) -> SentOrder:
         """Order something of a tube and wait for its answer."""
         order = self.ground.operator.command(tube, name, arguments)
         self.run(60.0, lambda: order.answered)
@@ -146,4 +146,4 @@ class Rig:
         return order
 
     def codes(self, tube: int) -> list[str]:
-        return [event.code for event in self.ground.model.events if event.tube == tube]
+        return [event.code for event in self.ground.model.string.events if event.tube == tube]

@@ -13,7 +13,7 @@ from hand_fed import Rig
 
 from groundstation.gateway.lease import take_lease
 from groundstation.gateway.page.page_settings import PageSettings
-from groundstation.host import answering, page_of
+from groundstation.ground_host import answering_operators, page_of
 from telemetry.media.zenoh_bus import open_router
 from telemetry.messages import Event, Severity
 
@@ -39,7 +39,7 @@ class Served:
         """One event more."""
 
         def submit(rig: Rig) -> None:
-            number = 500 + rig.ground.model.seen["events"]
+            number = 500 + rig.ground.model.newest_row("events")
             rig.tube.mail.submit(Event(1, number, rig.now, Severity.INFO, "stopped"), rig.now)
             rig.run(2.0)
 
@@ -57,7 +57,7 @@ def serving(rig: Rig, page: PageSettings | None = None) -> Iterator[Served]:
     async def serve() -> None:
         with open_router(endpoint) as bus, page_of(page) as serve_page:
             take_lease(bus, "rig-1")
-            async with answering(rig.ground, bus, serve_page):
+            async with answering_operators(rig.ground, bus, serve_page):
                 ready.set()
                 await end.wait()
 

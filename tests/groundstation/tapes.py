@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from borechain.recording.recording_file import RecordedSample, RecordingWriter
+from groundstation.recording.recording_file import RecordedSample, RecordingWriter
 from groundstation.service.answers.answer_table import schemas_by_path
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import BEGIN, Intake, pack_intake

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from groundstation.service.hole.deviation_alarms import Alarm, AlarmList
+from groundstation.service.hole.deviation_alarms import AlarmList, DeviationAlarm
 from groundstation.survey.wall.column_deviation import Deviation
 
 
@@ -12,7 +12,7 @@ def at(used: float, md: float = 10.0) -> Deviation:
     return Deviation(md, md, np.array([0.0, 0.1 * used]), np.diag([1e-4, 4e-6]), 0.1)
 
 
-def levels(alarms: list[Alarm], kind: str = "deviation") -> list[float]:
+def levels(alarms: list[DeviationAlarm], kind: str = "deviation") -> list[float]:
     return sorted(alarm.level for alarm in alarms if alarm.kind == kind)
 
 

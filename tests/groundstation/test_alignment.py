@@ -10,15 +10,15 @@ from schemas import shown_on
 
 from groundstation.config import GroundConfig
 from groundstation.service.answers.model import RigModel
-from groundstation.service.hole.resolved_stops import force_var
-from groundstation.service.orders.order_book import Order
+from groundstation.service.hole.resolving import force_vars
+from groundstation.service.orders.order_book import SentOrder
 from groundstation.survey.fusion.resolve import combine_imus
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import RigContext
 from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.process.tube_process import TubeProcess
-from telemetry.messages import ImuMean, Mode, NodeFlag, Stand, SurveyMeasurement
+from telemetry.messages import ImuMean, NodeFlag, NodeMode, Stand, SurveyMeasurement
 
 G = 9.81
 PITCH = 0.6 * DEG
@@ -42,7 +42,7 @@ class Bored(Rig):
             self.force[tube] = frame @ force
         super().cycle()
 
-    def ordered(self, **arguments: float | str) -> Order:
+    def ordered(self, **arguments: float | str) -> SentOrder:
         return self.order(1, "align", **arguments)
 
 
@@ -57,8 +57,8 @@ def test_an_alignment_is_ordered_followed_and_shown_at_the_surface(tmp_path: Pat
     assert (reply.done, reply.values) == (True, {"method": "circle", "turns": 1.0})
     rig.spin = 10.0 * DEG
     rig.run(10.0)
-    assert rig.ground.model.nodes[1].mode is Mode.ALIGNMENT
-    assert rig.ground.model.nodes[2].mode is Mode.TRACKING
+    assert rig.ground.model.string.states.newest[1].mode is NodeMode.ALIGNMENT
+    assert rig.ground.model.string.states.newest[2].mode is NodeMode.TRACKING
     assert rig.ordered().detail == "an alignment is under way"
     rig.run(35.0)
     rig.spin = 0.0
@@ -66,9 +66,9 @@ def test_an_alignment_is_ordered_followed_and_shown_at_the_surface(tmp_path: Pat
     assert [code for code in rig.codes(1) if code.startswith("align")] == [
         "alignment_begun", "alignment_turning", "aligned",
     ]  # fmt: skip
-    pitch, roll, _ = rig.ground.model.nodes[1].alignment
+    pitch, roll, _ = rig.ground.model.string.states.newest[1].alignment
     assert (pitch, roll) == pytest.approx((PITCH, 0.0), abs=1e-5)
-    assert rig.ground.model.nodes[1].mode is Mode.STILL
+    assert rig.ground.model.string.states.newest[1].mode is NodeMode.STILL
 
 
 def test_two_imus_of_a_process_arrive_as_two_means(tmp_path: Path) -> None:
@@ -96,18 +96,18 @@ def test_two_imus_of_a_process_arrive_as_two_means(tmp_path: Path) -> None:
 
 
 def test_the_ground_station_weighs_all_imus_of_a_survey() -> None:
-    model = RigModel(GroundConfig(folder=Path(), tube_length=2.0))
-    assert model.depths.add_stand(Stand(model.epoch, 999.0, 1001.0, 2.0))
+    model = RigModel.begin(GroundConfig(folder=Path(), tube_length=2.0))
+    assert model.string.depths.add_stand(Stand(model.string.time.epoch, 999.0, 1001.0, 2.0))
     lean, variances = 2.0 * DEG, (1e-8, 3e-8)
     imus = tuple(
         ImuMean((G * math.sin(angle), 0.0, -G * math.cos(angle)), ((v, 0.0, 0.0), (0.0, v, 0.0), (0.0, 0.0, v)))
         for angle, v in zip((lean, lean + 4e-4 / G), variances, strict=True)
     )
     survey = SurveyMeasurement(1, 1, 1000.0, 1, imus, 0.0, 1e-9, 1e-9, 32, 20.0, NodeFlag.NONE)
-    assert model.on_survey(survey, 2.0) == ""
+    assert model.placement.place_one(survey, 2.0) == ""
     row = shown_on(model, "stations")["stations"][0]
     assert row["inclination_deg"] * DEG == pytest.approx(lean + 1e-4 / G, abs=1e-9)
     assert row["sigma_force_mps2"] ** 2 == pytest.approx(0.75e-8)
     covs = np.array([imu.force_cov for imu in imus])
     _, cov = combine_imus(np.array([imu.force for imu in imus]), covs)
-    assert force_var(survey) == pytest.approx(np.trace(cov) / 3.0)
+    assert force_vars(covs[None])[0] == pytest.approx(np.trace(cov) / 3.0)

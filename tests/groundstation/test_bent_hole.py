@@ -12,10 +12,10 @@ import pytest
 from schemas import check_answers, shown_on
 from test_model import survey
 
-from borechain.cli.rig.ground_settings import ground_settings
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from groundstation.config import GroundConfig
 from groundstation.service.answers.model import RigModel
+from sim.rig.ground_settings import ground_settings
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 from telemetry.messages import SurveyMeasurement
@@ -37,10 +37,10 @@ def passes(stops: int) -> list[Placed]:
 
 
 def model_of(folder: Path, placed: list[Placed], **settings: Any) -> RigModel:
-    model = RigModel(GroundConfig(folder=folder, **settings))
-    model.tally.restore([5, 4, 3, 2, 1])
+    model = RigModel.begin(GroundConfig(folder=folder, **settings))
+    model.string.tally.restore([5, 4, 3, 2, 1])
     for measurement, md in placed:
-        assert model.on_survey(measurement, md) == ""
+        assert model.placement.place_one(measurement, md) == ""
         _ = model.hole.trajectory  # what follows from each is worked out as it comes
     return model
 
@@ -88,7 +88,7 @@ def test_a_station_between_two_others_changes_what_is_below_it(tmp_path: Path) -
     assert before["transport_deg"] != pytest.approx(5.0 * LACKED_DEG, abs=1e-4)
     assert abs(before["transport_deg"] - 5.0 * LACKED_DEG) < 3.0 * before["sigma_transport_deg"]
     for measurement, md in late:
-        model.on_survey(measurement, md)
+        model.placement.place_one(measurement, md)
     after = rows(model)[-1]
     assert abs(after["transport_deg"] - 5.0 * LACKED_DEG) < abs(before["transport_deg"] - 5.0 * LACKED_DEG)
 

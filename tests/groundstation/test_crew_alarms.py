@@ -16,10 +16,10 @@ from groundstation.service.alarms.crew_alarms import (
     DELAYS,
     OPEN_AT_MOST,
     SETTLED_AFTER,
+    AlarmState,
     Condition,
     CrewAlarm,
     CrewAlarms,
-    State,
     Times,
 )
 from groundstation.service.alarms.rig_alarms import Level
@@ -42,7 +42,7 @@ class Clock:
         self.now += after
         self.alarms.update(conditions, Times(self.now, 1000.0 + self.now, UTC + self.now))
 
-    def states(self) -> dict[str, State]:
+    def states(self) -> dict[str, AlarmState]:
         return {alarm.condition.code: alarm.state(UTC + self.now) for alarm in self.alarms}
 
     def one(self) -> CrewAlarm:
@@ -59,7 +59,7 @@ def test_an_alarm_says_what_where_and_since_when(it: Clock) -> None:
     it.look(CLOCK)
     alarm = it.one()
     assert (alarm.number, alarm.condition, alarm.since, alarm.since_utc) == (1, CLOCK, 1100.5, UTC + 100.5)
-    assert it.states() == {"clock": State.RAISED}
+    assert it.states() == {"clock": AlarmState.RAISED}
 
 
 def test_what_is_short_is_no_alarm(it: Clock) -> None:
@@ -70,14 +70,14 @@ def test_what_is_short_is_no_alarm(it: Clock) -> None:
     it.look(SILENT)
     assert it.states() == {}
     it.look(SILENT, after=DELAYS[Level.DEGRADED])
-    assert it.states() == {"tube_silent": State.RAISED}
+    assert it.states() == {"tube_silent": AlarmState.RAISED}
 
 
 def test_the_course_of_an_alarm_that_is_acknowledged_first(it: Clock) -> None:
     it.look(CLOCK)
     it.alarms.put(it.alarms.acknowledged(1, "anna", UTC + it.now))
     it.look(CLOCK)
-    assert it.states() == {"clock": State.ACKNOWLEDGED}
+    assert it.states() == {"clock": AlarmState.ACKNOWLEDGED}
     it.look()
     assert it.states() == {}
     assert [alarm.number for alarm in it.alarms.cleared] == [1]
@@ -86,7 +86,7 @@ def test_the_course_of_an_alarm_that_is_acknowledged_first(it: Clock) -> None:
 def test_a_bad_one_that_is_gone_stays_until_somebody_has_seen_it(it: Clock) -> None:
     it.look(CLOCK)
     it.look(after=3600.0)
-    assert it.states() == {"clock": State.LATCHED}
+    assert it.states() == {"clock": AlarmState.LATCHED}
     it.alarms.put(it.alarms.acknowledged(1, "anna", UTC + it.now))
     assert it.states() == {}
 
@@ -118,16 +118,16 @@ def test_an_unknown_number_is_told_which_there_are(it: Clock) -> None:
 def test_a_shelved_alarm_is_back_after_its_time(it: Clock) -> None:
     it.look(CLOCK)
     it.alarms.put(it.alarms.shelved(1, "anna", UTC + it.now + 60.0))
-    assert it.states() == {"clock": State.SHELVED}
+    assert it.states() == {"clock": AlarmState.SHELVED}
     it.look(CLOCK, after=59.0)
-    assert it.states() == {"clock": State.SHELVED}
+    assert it.states() == {"clock": AlarmState.SHELVED}
     it.alarms.drain_changed()
     it.look(CLOCK, after=1.0)
-    assert it.states() == {"clock": State.RAISED}
+    assert it.states() == {"clock": AlarmState.RAISED}
     assert len(it.alarms.drain_changed()) == 1
     it.alarms.put(it.alarms.shelved(1, "anna", UTC + it.now + 60.0))
     it.alarms.put(it.alarms.unshelved(1))
-    assert it.states() == {"clock": State.RAISED}
+    assert it.states() == {"clock": AlarmState.RAISED}
 
 
 def test_a_worse_level_of_the_same_wants_to_be_acknowledged_anew(it: Clock) -> None:
@@ -137,9 +137,9 @@ def test_a_worse_level_of_the_same_wants_to_be_acknowledged_anew(it: Clock) -> N
     it.look(column(Level.NOTICE))
     it.alarms.put(it.alarms.acknowledged(1, "anna", UTC + it.now))
     it.look(column(Level.NOTICE))
-    assert it.states() == {"projection": State.ACKNOWLEDGED}
+    assert it.states() == {"projection": AlarmState.ACKNOWLEDGED}
     it.look(column(Level.DEGRADED))
-    assert (it.one().number, it.one().times, it.states()) == (1, 2, {"projection": State.RAISED})
+    assert (it.one().number, it.one().times, it.states()) == (1, 2, {"projection": AlarmState.RAISED})
     it.look(column(Level.NOTICE))
     assert it.one().condition.level is Level.NOTICE
 
@@ -174,7 +174,7 @@ def test_of_a_flood_the_worst_are_kept_and_the_rest_is_counted(it: Clock) -> Non
     assert len(it.alarms.drain_changed()) <= OPEN_AT_MOST + 1
     it.look(CLOCK, after=700.0)
     assert not it.alarms.in_flood
-    assert it.states() == {"clock": State.RAISED}
+    assert it.states() == {"clock": AlarmState.RAISED}
     assert it.alarms.left_out == 1001 - OPEN_AT_MOST
 
 
@@ -215,9 +215,9 @@ def test_a_restart_keeps_numbers_acknowledgement_and_shelf(it: Clock) -> None:
     again.now = it.now
     again.alarms.restore(kept, [])
     again.look()
-    assert again.states() == {"clock": State.ACKNOWLEDGED, "tube_silent": State.SHELVED}
+    assert again.states() == {"clock": AlarmState.ACKNOWLEDGED, "tube_silent": AlarmState.SHELVED}
     again.look(after=SETTLED_AFTER)
-    assert again.states() == {"tube_silent": State.SHELVED}
+    assert again.states() == {"tube_silent": AlarmState.SHELVED}
     again.look(Condition("disk", "database", Level.BAD))
     assert [alarm.number for alarm in again.alarms] == [3, 2]
 
@@ -230,7 +230,7 @@ def test_stored_data_raise_nothing_but_what_is_worse_does(it: Clock) -> None:
     assert it.states() == {}
     worse = Condition("projection", "column", Level.BAD)
     it.look(worse)
-    assert it.states() == {"projection": State.RAISED}
+    assert it.states() == {"projection": AlarmState.RAISED}
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", "null", '{"number": 1}', '{"number": "1", "condition": {}}'])

@@ -11,7 +11,7 @@ from groundstation.service.string.depth import DepthLog, Track
 from telemetry.application.depth_source import DepthSource
 from telemetry.errors import EncodeError
 from telemetry.messages import DepthReading, Stand
-from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.presentation.msgpack_codec import decode_message, encode_message
 from telemetry.quantities import MAX_STANDS
 
 EPOCH, CYCLE = 3, 0.5
@@ -285,7 +285,7 @@ def test_a_repeated_reading_changes_nothing() -> None:
 @pytest.mark.parametrize("md", [-1e-9, -1.0, math.nan, math.inf, 1e6])
 def test_there_is_no_negative_depth_and_none_that_is_no_number(md: float) -> None:
     with pytest.raises(EncodeError):
-        encode(DepthReading(1, 0.0, md, ()))
+        encode_message(DepthReading(1, 0.0, md, ()))
 
 
 @given(st.lists(st.tuples(st.sampled_from([0.0, 0.1, 0.2, -0.1]), st.integers(1, 3)), min_size=1, max_size=120))
@@ -312,4 +312,4 @@ def test_a_reading_with_all_its_stands_travels() -> None:
         bit.stand(2.0)
     reading = bit.source.measure(bit.now + 1.0, bit.md)
     assert len(reading.stands) == MAX_STANDS
-    assert decode(encode(reading)) == reading
+    assert decode_message(encode_message(reading)) == reading

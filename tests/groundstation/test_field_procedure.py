@@ -15,7 +15,11 @@ from groundstation.calibration.block import read_calibration
 from groundstation.errors import SelectorError
 from groundstation.service.answers.answer_table import ANSWERS
 from groundstation.service.orders.recalibration.procedure import FieldProcedure, Request
-from groundstation.service.orders.recalibration.recalibration_progress import Phase, Progress, Stage
+from groundstation.service.orders.recalibration.recalibration_progress import (
+    RecalibrationProgress,
+    RecalibrationStage,
+    TubePhase,
+)
 from node.kernels.arithmetic.formats import DEG
 from telemetry.messages import BASE, BlockSegment, Reply, StaticRecord
 from telemetry.parameters import ParameterBlock, SensorParameters
@@ -239,7 +243,7 @@ def test_a_record_that_moved_is_taken_again_and_never_counts(rig: Field) -> None
     rig.run(SECONDS)
     rows = {row["tube"]: row for row in rig.view()["tubes"]}
     assert (rows[1]["records"], rows[2]["records"]) == (8, 9)
-    assert any(record.moved for record in rig.ground.model.static_records)
+    assert any(record.moved for record in rig.ground.model.string.static_records)
     rig.run(30.0, rig.is_complete)
     rig.collect(PRESETS[9:])
     finish(rig)
@@ -276,7 +280,7 @@ def test_a_record_that_ends_after_the_tubes_left_does_not_count(rig: Field) -> N
     # told too early, and they are not there; the order that would take the record's place does not come through
     rig.command("attitude", pitch_deg="90", roll_deg="0", seconds="8")
     rig.run(6.0)
-    records = [record for record in rig.ground.model.static_records if record.tube == 1]
+    records = [record for record in rig.ground.model.string.static_records if record.tube == 1]
     assert [record.moved for record in records] == [False, False]
     assert [row["records"] for row in rig.view()["tubes"]] == [1, 1]
 
@@ -381,8 +385,8 @@ def test_progress_comes_back_from_its_text(rig: Field) -> None:
     rig.collect(PRESETS)
     rig.command("solve")
     progress = rig.ground.model.recalibration.progress
-    assert Progress.from_json(progress.to_json()) == progress
-    assert (progress.stage, progress.tubes[1].phase) == (Stage.SOLVED, Phase.PROPOSED)
+    assert RecalibrationProgress.from_json(progress.to_json()) == progress
+    assert (progress.stage, progress.tubes[1].phase) == (RecalibrationStage.SOLVED, TubePhase.PROPOSED)
     assert rig.ground.store.progress() == progress.to_json()
 
 

@@ -122,15 +122,15 @@ def test_without_a_wall_there_is_none(tmp_path: Path) -> None:
 
 def test_a_hole_that_is_no_column_of_the_wall_is_refused_by_name(site: Site) -> None:
     with pytest.raises(SurveyError, match="column 'H9' is not among the heads; expected one of H1, H2, H3"):
-        RigModel(GroundConfig(folder=site.folder, wall=site.file, hole="H9"))
+        RigModel.begin(GroundConfig(folder=site.folder, wall=site.file, hole="H9"))
     with pytest.raises(SurveyError, match="expected a wall file"):
-        RigModel(GroundConfig(folder=site.folder, wall=site.folder / "none.toml", hole="H1"))
+        RigModel.begin(GroundConfig(folder=site.folder, wall=site.folder / "none.toml", hole="H1"))
 
 
 def test_a_wall_that_contradicts_itself_is_told_and_answers_go_on(site: Site) -> None:
     """A bit above the survey of its own hole: the answer says so, and nothing fails."""
     site.drill("H1", 0.0)
-    model = RigModel(GroundConfig(folder=site.folder / "x", wall=site.file, hole="H2"))
+    model = RigModel.begin(GroundConfig(folder=site.folder / "x", wall=site.file, hole="H2"))
     assert model.wall is not None
     broken = model.wall.judged([(2.0, 1.5, 0.0), (4.0, 1.6, 0.0)], 4.0)
     assert broken.judgement is None

@@ -16,6 +16,7 @@ from schemas import check_answers, shown_on
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
 from groundstation.service.answers.model import RigModel
+from groundstation.service.string.stored import Stored
 from groundstation.survey.fusion.resolve import direction_angles
 from groundstation.survey.well.ellipsoid import plan_ellipse
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
@@ -55,21 +56,21 @@ def passes(stops: int, inclination_deg: Callable[[int, int], float], apart: floa
 
 def knowing(tmp_path: Path, measurements: list[Placed], tubes: int = 0, **settings: Any) -> RigModel:
     """RigModel of surveys in the order in which they come; the string's order is known beforehand."""
-    model = RigModel(GroundConfig(folder=tmp_path, **settings))
-    model.tally.restore(list(range(tubes, 0, -1)))
+    model = RigModel.begin(GroundConfig(folder=tmp_path, **settings))
+    model.string.tally.restore(list(range(tubes, 0, -1)))
     for measurement, md in measurements:
-        assert model.on_survey(measurement, md) == ""
+        assert model.placement.place_one(measurement, md) == ""
     return model
 
 
 def inclination_deg(model: RigModel, station: int) -> float:
-    fused = model.fused(model.stations[station])
+    fused = model.hole.direction_of(model.hole.stations[station])
     return direction_angles(fused.lean, fused.down)[0] / DEG
 
 
 def test_readings_of_a_hole_that_stays_all_count(tmp_path: Path) -> None:
     model = knowing(tmp_path, passes(5, lambda _stop, _station: 1.0), 5)
-    assert [(s.md, s.count, s.first) for s in model.stations] == [
+    assert [(s.md, s.count, s.first) for s in model.hole.stations] == [
         (2.0, 5, 0), (4.0, 4, 0), (6.0, 3, 0), (8.0, 2, 0), (10.0, 1, 0),
     ]  # fmt: skip
     assert model.hole.moved == []
@@ -93,7 +94,7 @@ def test_a_hole_that_moved_drops_what_was_read_before(tmp_path: Path, order: str
     }
     measurements.sort(key=lambda placed: (placed[0].sequence, place[order](placed[0].tube)))
     model = knowing(tmp_path, measurements, stops)
-    for station, known in enumerate(model.stations):
+    for station, known in enumerate(model.hole.stations):
         assert inclination_deg(model, station) == pytest.approx(2.0, abs=1e-6), known.md
         assert known.first == known.count - 1
     assert sorted(moved.md for moved in model.hole.moved) == [2.0 * n for n in range(1, stops)]
@@ -113,7 +114,7 @@ def test_the_evidence_of_a_movement_is_kept(tmp_path: Path) -> None:
 
 def test_readings_after_a_movement_count_together(tmp_path: Path) -> None:
     model = knowing(tmp_path, moving(6, 5), 6)
-    first = model.stations[0]
+    first = model.hole.stations[0]
     assert (first.count, first.first) == (6, 4)
     assert len(first.counting) == 2
     assert inclination_deg(model, 0) == pytest.approx(2.0, abs=1e-6)
@@ -125,7 +126,7 @@ def test_an_outlier_at_one_station_drops_nothing(tmp_path: Path, outlier: int) -
     measurements = passes(5, lambda stop, station: 2.0 if (stop, station) == (5, outlier) else 1.0)
     model = knowing(tmp_path, measurements, 5)
     assert model.hole.moved == []
-    assert all(known.first == 0 for known in model.stations)
+    assert all(known.first == 0 for known in model.hole.stations)
     assert 1.0 < inclination_deg(model, outlier - 1) < 2.0
 
 
@@ -145,8 +146,8 @@ def test_a_neighbour_that_changed_at_another_stop_is_no_evidence(tmp_path: Path)
 
 def result(model: RigModel) -> dict[str, Any]:
     """All that follows from the surveys."""
-    stations = [(s.md, s.first, [(c.tube, c.sequence) for c in s.clusters]) for s in model.stations]
-    fused = [model.fused(s) for s in model.stations]
+    stations = [(s.md, s.first, [(c.tube, c.sequence) for c in s.stops]) for s in model.hole.stations]
+    fused = [model.hole.direction_of(s) for s in model.hole.stations]
     directions = [np.concatenate([f.lean, [f.down], f.cov.ravel(), f.total_cov.ravel()]) for f in fused]
     points = [np.concatenate([[p.md], p.position, p.cov.ravel()]) for p in model.hole.trajectory]
     assert model.hole.projection is not None
@@ -206,7 +207,7 @@ def test_a_station_that_was_met_later_changes_no_earlier_decision(tmp_path: Path
 def test_a_late_survey_clears_no_alarm_before_it_was_raised(tmp_path: Path) -> None:
     model = knowing(tmp_path, [(survey(1, 2, 1, 2.0), 4.0)], 1, tolerance="5-cm")
     assert model.hole.alarms.active
-    assert model.on_survey(survey(1, 1, 1, 2.0, azimuth_deg=180.0), 2.0) == ""
+    assert model.placement.place_one(survey(1, 1, 1, 2.0, azimuth_deg=180.0), 2.0) == ""
     assert any(alarm.cleared_at is not None for alarm in model.hole.alarms.alarms)
     for alarm in model.hole.alarms.alarms:
         assert alarm.cleared_at is None or alarm.cleared_at >= alarm.raised_at
@@ -217,8 +218,8 @@ def test_it_does_not_matter_whether_somebody_looks_between_two_surveys(tmp_path:
     measurements = moving(5, 5)
     looked_at = knowing(tmp_path, [], 5)
     for measurement, md in measurements:
-        looked_at.on_survey(measurement, md)
-        assert looked_at.hole.trajectory[-1].md == looked_at.stations[-1].md
+        looked_at.placement.place_one(measurement, md)
+        assert looked_at.hole.trajectory[-1].md == looked_at.hole.stations[-1].md
     together = knowing(tmp_path, measurements, 5)
     assert pickle.dumps(result(looked_at)) == pickle.dumps(result(together))
     assert [moment.rows[-1].md for moment in together.hole.history.moments] == [2.0, 4.0, 6.0, 8.0]
@@ -236,9 +237,9 @@ def test_a_measurement_that_is_none_is_counted_and_changes_nothing(tmp_path: Pat
     model = knowing(tmp_path, passes(2, lambda _stop, _station: 1.0), 2)
     before = result(model)
     bad = SurveyMeasurement(1, 9, 2000.0, 1, (ImuMean((0.0, 0.0, 0.0), COV),), 0.0, 1e-8, 1e-8, 32, 20.0, NodeFlag.NONE)
-    assert model.on_survey(bad, 2.0) == "survey_refused"
-    assert model.on_survey(survey(1, 10, 1, 1.0), None) == ""
-    assert (model.refused, model.unplaced) == (1, 1)
+    assert model.placement.place_one(bad, 2.0) == "survey_refused"
+    assert model.placement.wait_for_depth(Stored(survey(1, 10, 1, 1.0), None)) == ""
+    assert (model.placement.refused, model.placement.unplaced) == (1, 1)
     assert differing(result(model), before) == []
 
 
@@ -287,11 +288,11 @@ def test_another_confidence_scales_the_regions(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["", "abc", "0", "1", "-0.5", "95", "nan", "inf", "1e-999"])
 def test_a_confidence_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
     with pytest.raises(SelectorError, match="confidence"):
-        shown_on(RigModel(GroundConfig(folder=tmp_path)), "uncertainty", confidence=text)
+        shown_on(RigModel.begin(GroundConfig(folder=tmp_path)), "uncertainty", confidence=text)
 
 
 def test_views_of_nothing_have_the_collar_alone(tmp_path: Path) -> None:
-    model = RigModel(GroundConfig(folder=tmp_path))
+    model = RigModel.begin(GroundConfig(folder=tmp_path))
     assert [row["md_m"] for row in shown_on(model, "uncertainty")["stations"]] == [0.0]
     column = shown_on(model, "column")
     assert [row["deviation_cm"] for row in column["stations"]] == [0.0]

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from groundstation.service.process.ground_process import GroundProcess
 from node.process.counter import LOTS
 from node.process.tube_process import TubeProcess
@@ -17,7 +17,7 @@ from sim.world.scenario import load_scenario, scenario_of
 from sim.world.world import World
 from telemetry.frozen import replace
 from telemetry.messages import BASE, ENCODER, DepthReading
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 
 pytestmark = pytest.mark.slow
 
@@ -169,11 +169,11 @@ def test_a_ground_station_that_is_off_across_a_stop_places_its_surveys(rig: Dril
 
 def test_a_depth_from_the_future_changes_nothing(rig: Drilled) -> None:
     rig.drill(rig.stops[0] + 5.0)
-    forged = encode(DepthReading(1, rig.scheduler.now + 300.0, 1.0, ()))
+    forged = encode_message(DepthReading(1, rig.scheduler.now + 300.0, 1.0, ()))
     rig.ground.on_depth(forged, rig.world.local_clock(BASE, rig.scheduler.now))
     rig.finish()
     assert rig.surveys() == EVERY
-    assert rig.ground.model.depths.refusals["ahead of rig time"] == 1
+    assert rig.ground.model.string.depths.refusals["ahead of rig time"] == 1
 
 
 def empty(folder: Path) -> None:

@@ -3,11 +3,11 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.service.string.message_numbers import Numbers
+from groundstation.service.string.message_numbers import MessageNumbers
 from telemetry.application.series import SERIES_SHIFT
 
 
-def gaps(numbers: Numbers, tube: int) -> list[tuple[int, int]]:
+def gaps(numbers: MessageNumbers, tube: int) -> list[tuple[int, int]]:
     """Every gap, by giving up one after the other."""
     found = []
     while (gap := numbers.gap(tube)) is not None:
@@ -18,7 +18,7 @@ def gaps(numbers: Numbers, tube: int) -> list[tuple[int, int]]:
 
 @given(st.sets(st.integers(1, 60)), st.integers(0, 60), st.randoms(), st.sampled_from([0, 7]))
 def test_what_is_missing_is_what_did_not_come(came: set[int], told: int, random: object, series: int) -> None:
-    base, numbers, order = series << SERIES_SHIFT, Numbers(), list(came)
+    base, numbers, order = series << SERIES_SHIFT, MessageNumbers(), list(came)
     random.shuffle(order)  # type: ignore[attr-defined]
     for number in order:
         numbers.add_number(3, base + number)
@@ -29,7 +29,7 @@ def test_what_is_missing_is_what_did_not_come(came: set[int], told: int, random:
 
 
 def test_a_tube_that_counts_anew_is_noticed() -> None:
-    numbers = Numbers()
+    numbers = MessageNumbers()
     assert not numbers.on_told(1, 5)
     assert not numbers.on_told(1, 6)
     assert numbers.on_told(1, 2)
@@ -38,6 +38,6 @@ def test_a_tube_that_counts_anew_is_noticed() -> None:
 
 
 def test_a_huge_forged_number_costs_no_memory() -> None:
-    numbers = Numbers()
+    numbers = MessageNumbers()
     numbers.on_told(1, (1 << SERIES_SHIFT) - 1)
     assert gaps(numbers, 1) == [(1, (1 << SERIES_SHIFT) - 1)]

@@ -8,7 +8,7 @@ from memory_rig import Rig
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
-from groundstation.service.orders.order_book import KEPT, Order, OrderBook, OrderState
+from groundstation.service.orders.order_book import KEPT, OrderBook, OrderState, SentOrder
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.operator_access import ANSWERED_WITHIN, OPEN_AT_MOST
 from telemetry.application.commands import find_command
@@ -43,7 +43,7 @@ def test_orders_to_a_silent_tube_are_bounded_and_withdrawn_in_the_end(rig: Rig) 
     with pytest.raises(SelectorError, match=f"tube 1: expected at most {OPEN_AT_MOST} orders without an answer"):
         operator.command(1, "take_survey")
     assert rig.order(2, "parameters").state is OrderState.DONE
-    operator.expire_orders(rig.ground.model.now + ANSWERED_WITHIN + 60.0)
+    operator.expire_orders(rig.ground.model.string.time.now + ANSWERED_WITHIN + 60.0)
     assert {order.state for order in orders} == {OrderState.FAILED}
     rig.join(2, 1)
     rig.run(70.0)
@@ -152,7 +152,7 @@ def test_a_ground_station_that_knows_no_tube_says_so(tmp_path: Path) -> None:
 def test_the_oldest_orders_that_ended_make_room_and_those_that_have_not_stay() -> None:
     book = OrderBook()
     for number in range(KEPT + 20):
-        book.add(Order(number, find_command("take_survey"), 1, {}, "anna", 0.0, ""))
+        book.add(SentOrder(number, find_command("take_survey"), 1, {}, "anna", 0.0, ""))
         if number % 2:
             book.finish(number)
     kept = [order.number for order in book]

@@ -8,8 +8,9 @@ import pytest
 import sqlalchemy as sa
 from hand_fed import COV, Rig
 
+from borechain.load.placing_calls import CALLS_AT_MOST, TUBES, count_placing_calls
 from telemetry.messages import DepthReading, ImuMean, NodeFlag, Stand, SurveyMeasurement
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 
 HERE, THERE = 2.0, 2.5  # m
 
@@ -60,8 +61,8 @@ def test_a_depth_that_is_known_is_stored_with_its_survey_and_not_again(rig: Rig)
         rig.now += 0.5
         rig.read_depth(HERE)
     assert "UPDATE" not in written
-    assert rig.ground.model.seen["measurements"] == 1
-    assert rig.ground.model.waiting == []
+    assert rig.ground.model.newest_row("measurements") == 1
+    assert rig.ground.model.placement.waiting == []
 
 
 def test_a_depth_that_is_not_known_yet_is_stored_when_it_is(rig: Rig) -> None:
@@ -70,7 +71,7 @@ def test_a_depth_that_is_not_known_yet_is_stored_when_it_is(rig: Rig) -> None:
     rig.now += 0.5
     rig.read_depth(HERE)
     assert stored(rig) == [HERE]
-    assert rig.ground.model.seen["measurements"] == 1
+    assert rig.ground.model.newest_row("measurements") == 1
 
 
 def test_a_depth_that_is_doubted_before_the_survey_is_fused_is_taken_back(rig: Rig, tmp_path: Path) -> None:
@@ -84,11 +85,20 @@ def test_a_depth_that_is_doubted_before_the_survey_is_fused_is_taken_back(rig: R
     again.speak(1)
     take(again, 1, at)
     assert stored(again) == [HERE]
-    epoch, model = again.ground.model.epoch, again.ground.model
+    epoch, model = again.ground.model.string.time.epoch, again.ground.model
     other = Stand(epoch, at - 0.25, at + 0.25, THERE)
     again.now += 0.5
-    again.ground.on_depth(encode(DepthReading(1000, again.now, HERE, (other,), epoch)), again.now)
+    again.ground.on_depth(encode_message(DepthReading(1000, again.now, HERE, (other,), epoch)), again.now)
     assert stored(again) == [None]
-    assert [one.kept for one in model.waiting] == [None]
-    assert model.seen["measurements"] == 0
+    assert [one.md for one in model.placement.waiting] == [None]
+    assert model.newest_row("measurements") == 0
     again.ground.close()
+
+
+@pytest.mark.slow
+def test_one_more_measurement_is_placed_in_three_hundred_calls(tmp_path: Path) -> None:
+    """From the arrival of its message to the hole that is worked out; the last tube of a stop costs as the first."""
+    counts = count_placing_calls(tmp_path)
+    assert len(counts) == TUBES
+    assert max(counts) <= CALLS_AT_MOST == 300
+    assert counts[-1] - min(counts) < 30

@@ -15,7 +15,7 @@ import pytest
 from hand_fed import COV, VAR, Rig
 from schemas import check_answers
 
-from groundstation.host import answering
+from groundstation.ground_host import answering_operators
 from telemetry.frozen import replace
 from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
 from telemetry.messages import (
@@ -28,7 +28,7 @@ from telemetry.messages import (
     StaticRecord,
     SurveyMeasurement,
 )
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 
 NO_COV = ((VAR, 5.0, 0.0), (5.0, VAR, 0.0), (0.0, 0.0, VAR))
 MEASUREMENT = SurveyMeasurement(
@@ -80,7 +80,7 @@ async def rig(tmp_path: Path, buses: tuple[ZenohBus, ZenohBus]) -> AsyncIterator
     server, operator = buses
     rig = Rig(tmp_path)
     with contextlib.closing(rig.ground):
-        async with answering(rig.ground, server):
+        async with answering_operators(rig.ground, server):
             rig.run(3.0)
             rig.depth(2.0)
             rig.state(1, 1)
@@ -206,13 +206,13 @@ async def test_a_restart_forgets_and_doubles_nothing(rig: tuple[Rig, ZenohBus], 
     again = start()
     again.now = it.now
     model = again.ground.model
-    assert [(s.md, s.count) for s in model.stations] == [(2.0, 2), (4.0, 1)]
-    assert [e.sequence for e in model.events] == [7]
+    assert [(s.md, s.count) for s in model.hole.stations] == [(2.0, 2), (4.0, 1)]
+    assert [e.sequence for e in model.string.events] == [7]
     again.run(3.0)
     stored = next(one.message for one in again.ground.store.messages() if isinstance(one.message, SurveyMeasurement))
     again.tube.mail.submit(stored, again.now)  # its receipt was lost
     again.run(2.0)
-    assert [(s.md, s.count) for s in model.stations] == [(2.0, 2), (4.0, 1)]
+    assert [(s.md, s.count) for s in model.hole.stations] == [(2.0, 2), (4.0, 1)]
     assert again.tube.mail.outbox_size == 0
     assert before[0]["measurements"] == 2
 
@@ -231,7 +231,7 @@ def test_a_survey_that_comes_before_any_state_after_a_restart_finds_its_station(
     again.run(3.0)
     again.read_depth(4.0)
     again.survey(2, 1)
-    assert [(s.md, s.count) for s in again.ground.model.stations] == [(2.0, 1)]
+    assert [(s.md, s.count) for s in again.ground.model.hole.stations] == [(2.0, 1)]
 
 
 def test_a_covariance_that_is_none_is_kept_and_counted_now_and_after_a_restart(start: Callable[[], Rig]) -> None:
@@ -243,20 +243,20 @@ def test_a_covariance_that_is_none_is_kept_and_counted_now_and_after_a_restart(s
     rig.run(2.0)
     rig.read_depth(2.0)
     assert rig.tube.mail.outbox_size == 0
-    assert (rig.ground.model.refused, rig.ground.model.stations) == (1, [])
+    assert (rig.ground.model.placement.refused, rig.ground.model.hole.stations) == (1, [])
     rig.ground.store.close()
-    assert start().ground.model.refused == 1
+    assert start().ground.model.placement.refused == 1
 
 
 @pytest.mark.parametrize(
-    "payload", [b"", b"\x93\x01", b"\xc1", encode(Receipt(1, 2)), msgpack.packb([1.0, 2.0]), b"x" * 9000]
+    "payload", [b"", b"\x93\x01", b"\xc1", encode_message(Receipt(1, 2)), msgpack.packb([1.0, 2.0]), b"x" * 9000]
 )
 def test_bytes_that_are_no_depth_are_counted_and_told(start: Callable[[], Rig], payload: bytes) -> None:
     rig = start()
     rig.run(3.0)
     rig.depth(2.0)
     rig.ground.on_depth(payload, rig.now)
-    assert rig.ground.model.depths.latest == 2.0
+    assert rig.ground.model.string.depths.latest == 2.0
     assert rig.ground.endpoint.counters["bad_depths"] == 1
     assert rig.alarms() >= {"bad_input"}
 
@@ -316,14 +316,14 @@ def test_a_depth_that_jumped_is_not_believed_by_a_later_start_until_somebody_has
         rig = next_start(rig)
         rig.depth(3.9)
         rig.run(1.0)
-        assert rig.ground.model.depths.latest == 2.5
+        assert rig.ground.model.string.depths.latest == 2.5
         assert "depth_refused" in rig.alarms()
     rig.ground.operator.order("accept_depth", {"action": "confirm"}, by="crew")
     rig.run(1.0)
     for _ in range(2):
         rig.depth(3.9)
         rig.run(1.0)
-        assert rig.ground.model.depths.latest == 3.9
+        assert rig.ground.model.string.depths.latest == 3.9
         assert "depth_refused" not in rig.alarms()
         rig = next_start(rig)
 
@@ -337,7 +337,7 @@ def test_a_survey_from_before_the_restart_finds_its_depth(start: Callable[[], Ri
     first.depth(6.0)
     first.ground.store.close()
     again = start()
-    assert again.ground.model.depths.at(again.ground.model.epoch, when) == 4.0
+    assert again.ground.model.string.depths.at(again.ground.model.string.time.epoch, when) == 4.0
 
 
 def test_a_survey_without_a_depth_is_kept_and_counted(start: Callable[[], Rig]) -> None:
@@ -345,7 +345,7 @@ def test_a_survey_without_a_depth_is_kept_and_counted(start: Callable[[], Rig]) 
     rig.run(3.0)
     rig.survey(1, 1)
     rig.run(6.0)
-    assert rig.ground.model.unplaced == 1
+    assert rig.ground.model.placement.unplaced == 1
     assert "survey_unplaced" in rig.alarms()
     assert [s.md for s in rig.ground.store.messages()] == [None]
     assert rig.tube.mail.outbox_size == 0
@@ -445,7 +445,7 @@ async def test_more_questions_than_can_wait_are_refused_at_once(
 ) -> None:
     monkeypatch.setattr("groundstation.gateway.zenoh.WAITING", 2)
     server, operator = buses
-    async with answering(start().ground, server):
+    async with answering_operators(start().ground, server):
         with ThreadPoolExecutor(4) as askers:
             asked = [askers.submit(operator.get, f"{GROUND}/status", 10.0) for _ in range(4)]
             refused = [future.result() for future in itertools.islice(as_completed(asked), 2)]  # the loop stands still

@@ -49,7 +49,7 @@ def test_a_block_is_uploaded_applied_at_rest_and_told(rig: Rig) -> None:
     assert rig.tube(2).tube.parameters.version == 0
     rig.run(5.0)
     assert "parameters_applied" in rig.codes(1)
-    state = rig.ground.model.nodes[1]
+    state = rig.ground.model.string.states.newest[1]
     assert (state.parameters_version, state.parameters_hash) == (1, block().sha256()[:8])
     assert rig.order(1, "parameters").values == {"version": 1, "sha256": block().sha256().hex()}
     rig.start(1)
@@ -244,10 +244,10 @@ def test_a_damaged_block_falls_back_and_says_so(rig: Rig) -> None:
     rig.start(1)
     rig.run(15.0)
     assert rig.tube(1).tube.parameters == block(1)
-    (event,) = [e for e in rig.ground.model.events if e.code == "parameters_fallback"]
+    (event,) = [e for e in rig.ground.model.string.events if e.code == "parameters_fallback"]
     assert event.arguments["in_use"] == 1
     assert event.arguments["hash"] == block(1).sha256().hex()
-    assert rig.ground.model.nodes[1].parameters_hash == block(1).sha256()[:8]
+    assert rig.ground.model.string.states.newest[1].parameters_hash == block(1).sha256()[:8]
     assert rig.upload(block(2, bias=2e-3)).phase is UploadPhase.APPLIED
 
 
@@ -257,16 +257,16 @@ def test_a_static_record_is_taken_stored_and_still_known_after_a_restart(rig: Ri
     assert (order.state, order.done, order.values) == (OrderState.ACKNOWLEDGED, True, {"seconds": 20.0})
     rig.part(BASE, ENCODER)  # the surface end is cut off when the record is ready
     rig.run(30.0)
-    assert not rig.ground.model.static_records
+    assert not rig.ground.model.string.static_records
     rig.join(BASE, ENCODER)
     rig.run(40.0)
     assert order.state is OrderState.DONE
-    (record,) = rig.ground.model.static_records
+    (record,) = rig.ground.model.string.static_records
     assert (record.tube, record.command, record.moved) == (1, order.number, False)
     assert record.temperature == pytest.approx(30.0)
     assert rig.tube(1).endpoint.mail.outbox_size == 0
     rig.start(BASE)
-    assert list(rig.ground.model.static_records) == [record]
+    assert list(rig.ground.model.string.static_records) == [record]
 
 
 def test_a_turning_node_takes_no_static_record(rig: Rig) -> None:
@@ -292,8 +292,8 @@ def test_an_accelerometer_is_calibrated_from_the_surface_end_to_end(rig: Rig) ->
         rig.rate[1] = np.array([0.0, 2.0 * DEG, 0.0])  # a gyroscope never calibrated
         rig.run(4.0)
         assert rig.order(1, "static_record", seconds=5.0).done
-        rig.run(12.0, lambda: len(rig.ground.model.static_records) > len(readings))
-        readings.append(rig.ground.model.static_records[-1])
+        rig.run(12.0, lambda: len(rig.ground.model.string.static_records) > len(readings))
+        readings.append(rig.ground.model.string.static_records[-1])
     assert not any(record.moved for record in readings)
     solved = fit_attitudes(ATTITUDES, np.array([record.force for record in readings]))
     zeros = np.zeros((0, 3, 3)), np.zeros((0, 3))

@@ -26,10 +26,10 @@ SELECTIONS: list[dict[str, str]] = [
 
 
 def heard(tmp_path: Path, measurements: list[Placed]) -> RigModel:
-    model = RigModel(GroundConfig(folder=tmp_path))
-    model.tally.restore(list(range(STOPS, 0, -1)))
+    model = RigModel.begin(GroundConfig(folder=tmp_path))
+    model.string.tally.restore(list(range(STOPS, 0, -1)))
     for measurement, md in measurements:
-        model.on_survey(measurement, md)
+        model.placement.place_one(measurement, md)
     return model
 
 
@@ -79,8 +79,8 @@ def test_a_revision_says_what_it_replaces_and_is_new_in_the_stream(tmp_path: Pat
     first = passes(2, lambda _stop, _station: 1.0)
     model = heard(tmp_path, first)
     newest = shown_on(model, "measurements")["newest"]
-    model.on_survey(*revised(first[0], 7, 1e-3))
-    model.on_survey(*revised(first[0], 9, 2e-3))
+    model.placement.place_one(*revised(first[0], 7, 1e-3))
+    model.placement.place_one(*revised(first[0], 9, 2e-3))
     answer = shown_on(model, "measurements", since=str(newest), limit="10")
     assert [(row["sequence"], row["replaces"], row["seq"]) for row in answer["measurements"]] == [(9, 7, newest + 2)]
     assert len(shown_on(model, "measurements")["measurements"]) == len(first)
@@ -90,8 +90,8 @@ def test_an_older_word_that_comes_late_changes_nothing(tmp_path: Path) -> None:
     first = passes(2, lambda _stop, _station: 1.0)
     model = heard(tmp_path, [*first, revised(first[1], 9, 2e-3)])
     before, version = shown(model), model.hole.version
-    model.on_survey(*revised(first[1], 7, 1e-3))
-    model.on_survey(*first[1])
+    model.placement.place_one(*revised(first[1], 7, 1e-3))
+    model.placement.place_one(*first[1])
     assert shown(model) == before
     assert model.hole.version == version
 
@@ -101,17 +101,17 @@ def test_a_survey_whose_yaw_becomes_known_is_trusted_from_then_on(tmp_path: Path
     measurement, md = first[0]
     unknown = replace(measurement, flags=NodeFlag.RESTORED | NodeFlag.AIDING_OLD), md
     model = heard(tmp_path, [unknown])
-    assert [station.untrusted for station in model.stations] == [1]
-    model.on_survey(*revised((measurement, md), 5, 0.0))
-    assert [station.untrusted for station in model.stations] == [0]
-    assert model.stations[0].is_trusted
+    assert [station.untrusted for station in model.hole.stations] == [1]
+    model.placement.place_one(*revised((measurement, md), 5, 0.0))
+    assert [station.untrusted for station in model.hole.stations] == [0]
+    assert model.hole.stations[0].is_trusted
 
 
 def test_a_better_yaw_shows_in_the_station(tmp_path: Path) -> None:
     first = passes(1, lambda _stop, _station: 30.0)
     model = heard(tmp_path, first)
     (before,) = shown_on(model, "stations")["stations"]
-    model.on_survey(*revised(first[0], 5, math.radians(1.0)))
+    model.placement.place_one(*revised(first[0], 5, math.radians(1.0)))
     (after,) = shown_on(model, "stations")["stations"]
     assert after["azimuth_deg"] - before["azimuth_deg"] == pytest.approx(1.0)
     assert after["sigma_yaw_deg"] == pytest.approx(0.5 * before["sigma_yaw_deg"])
@@ -127,7 +127,7 @@ def test_the_text_of_all_measurements_is_that_of_now_however_often_it_was_asked_
     model = heard(tmp_path, [])
     path = find_path(model, "measurements")
     for placed in course:
-        model.on_survey(*placed)
+        model.placement.place_one(*placed)
         for parameters in data.draw(st.lists(st.sampled_from(SELECTIONS), max_size=3)):
             shown_now = shown_on(model, "measurements", **parameters)
             answer = orjson.loads(path.json(model, parameters))

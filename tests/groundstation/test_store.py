@@ -15,7 +15,7 @@ import pytest
 
 from groundstation.errors import StoreError
 from groundstation.service.disk.ground_store import Store
-from groundstation.service.string.depth import Doubt
+from groundstation.service.string.depth import DepthDoubt
 from telemetry.messages import Event, ImuMean, NodeFlag, Severity, Stand, SurveyMeasurement
 
 COV = ((1e-6, 0.0, 0.0), (0.0, 1e-6, 0.0), (0.0, 0.0, 1e-6))
@@ -35,12 +35,12 @@ HOARDER = """
 import os, sys
 from borechain.load.crowd import survey_of
 from groundstation.service.disk.ground_store import Store, Stored
-from sim.rig.realtime import footprint
+from sim.rig.realtime_run import memory_footprint
 store = Store(sys.argv[1])
 def fill(stops):
     for stop in stops:
         store.add_messages([Stored(survey_of(tube, stop, 1.0, tube), 1.0, 1.0) for tube in range(1, 51)])
-    return footprint(os.getpid())["private_mb"]
+    return memory_footprint(os.getpid())["private_mb"]
 print(-fill(range(1, 11)) + fill(range(11, 51)))
 """
 
@@ -227,11 +227,11 @@ def test_what_is_doubtful_of_the_depth_is_kept(tmp_path: Path) -> None:
     url = f"sqlite:///{tmp_path / 'ground.sqlite'}"
     times = (Stand(1, 0.1, math.inf, 1 / 3), Stand(2, -math.inf, 1e9 + 0.1, 3.25))
     for doubt in (
-        Doubt(),
-        Doubt((1, 1e9 + 0.1, 3.25)),
-        Doubt((2, 0.1, 1 / 3), (1, 2.5)),
-        Doubt(None, (2, 1 / 3), times),
-        Doubt(None, (2, 1 / 3)),
+        DepthDoubt(),
+        DepthDoubt((1, 1e9 + 0.1, 3.25)),
+        DepthDoubt((2, 0.1, 1 / 3), (1, 2.5)),
+        DepthDoubt(None, (2, 1 / 3), times),
+        DepthDoubt(None, (2, 1 / 3)),
     ):
         with closing(Store(url)) as store:
             store.keep_depth_doubt(doubt)
@@ -244,7 +244,7 @@ def test_what_is_doubtful_of_the_depth_is_kept(tmp_path: Path) -> None:
 def test_a_doubt_that_cannot_be_read_from_the_database_is_one_plain_error(tmp_path: Path, name: str, text: str) -> None:
     url = f"sqlite:///{tmp_path / 'ground.sqlite'}"
     with closing(Store(url)) as store:
-        store.keep_depth_doubt(Doubt((1, 2.0, 3.0), times=(Stand(1, 2.0, 3.0, 4.0),)))
+        store.keep_depth_doubt(DepthDoubt((1, 2.0, 3.0), times=(Stand(1, 2.0, 3.0, 4.0),)))
     with closing(sqlite3.connect(tmp_path / "ground.sqlite")) as database, database:
         database.execute("update meta set value = ? where name = ?", (text, f"depth_{name}"))
     with closing(Store(url)) as store, pytest.raises(StoreError, match="expected numbers of the depth"):

@@ -14,7 +14,7 @@ from hand_fed import Rig
 from schemas import check_answers
 
 from groundstation.errors import SelectorError
-from groundstation.host import answering
+from groundstation.ground_host import answering_operators
 from groundstation.service.answers.paths import answered_paths
 from telemetry.media.zenoh_bus import open_client, open_router
 from telemetry.messages import Event, Severity
@@ -125,7 +125,7 @@ async def test_new_rows_are_published_once_each_and_a_wrong_number_is_told_over_
     happen(rig, 1)
     key = "borechain/rig-1/ground"
     with open_router(endpoint) as server, open_client(endpoint, timeout=10.0) as bus:
-        async with answering(rig.ground, server):
+        async with answering_operators(rig.ground, server):
             seen: list[list[int]] = []
             bus.subscribe(f"{key}/events", lambda _key, payload: seen.append(seqs(json.loads(payload))))
             await asyncio.to_thread(bus.get, f"{key}/status", 10.0)  # the subscription has arrived by now

@@ -60,15 +60,20 @@ class Drilled:
                 self.surveys.append((measurement, 2.0 * station))
 
     def tell(self, model: RigModel) -> RigModel:
-        model.tally.restore(list(range(len(self.biases), 0, -1)))
+        model.string.tally.restore(list(range(len(self.biases), 0, -1)))
         for measurement, md in self.surveys:
-            assert model.on_survey(measurement, md) == ""
+            assert model.placement.place_one(measurement, md) == ""
         return model
+
+
+def biases_of(model: RigModel) -> dict[int, ForceBias]:
+    mixed = model.recalibration.progress.mixed
+    return surveyed_biases(model.config, model.hole, model.string.states.newest, mixed).found
 
 
 def found_by(folder: Path, hole: Drilled, stated_deg: float = SENSOR_BIAS_DEG) -> dict[int, ForceBias]:
     config = GroundConfig(folder=folder, mount_std_deg=0.0, accelerometer_bias_std_deg=stated_deg)
-    return surveyed_biases(hole.tell(RigModel(config))).found
+    return biases_of(hole.tell(RigModel.begin(config)))
 
 
 @pytest.mark.parametrize(("stated_deg", "known_mg"), [(SENSOR_BIAS_DEG, 0.1), (0.002, 1.0)])
@@ -106,9 +111,9 @@ def test_a_survey_whose_yaw_is_not_believed_says_nothing_of_a_bias(tmp_path: Pat
     wrong, md = hole.surveys[-1]
     forged = replace(wrong, sequence=99, yaw=wrong.yaw + 2.0, station_at=wrong.station_at + 30.0)
     config = GroundConfig(folder=tmp_path, mount_std_deg=0.0, accelerometer_bias_std_deg=SENSOR_BIAS_DEG)
-    model = hole.tell(RigModel(config))
-    assert model.on_survey(replace(forged, flags=NodeFlag.YAW_UNTRUSTED), md) == "survey_untrusted"
-    after = surveyed_biases(model).found
+    model = hole.tell(RigModel.begin(config))
+    assert model.placement.place_one(replace(forged, flags=NodeFlag.YAW_UNTRUSTED), md) == "survey_untrusted"
+    after = biases_of(model)
     assert [one.bias.tolist() for one in after.values()] == [one.bias.tolist() for one in before.values()]
 
 
@@ -140,7 +145,7 @@ def test_blocks_are_proposed_and_go_up_when_they_are_confirmed(tmp_path: Path) -
     model.recalibration.blocks.clear()
     rig.upload(ParameterBlock(2, 4, gyroscope, old))
     model.recalibration.progress.mixed.clear()  # as if that had been before the hole
-    found = surveyed_biases(model).found
+    found = biases_of(model)
     rig.command("begin")
     rig.run(6.0)
     shown = rig.command("surveys")
@@ -173,7 +178,7 @@ def test_what_surveys_cannot_give_is_refused_by_name(tmp_path: Path) -> None:
         rig.command("surveys")
     rig.command("begin", tubes="1")
     rig.run(6.0)
-    nodes = rig.ground.model.nodes
+    nodes = rig.ground.model.string.states.newest
     nodes[1] = replace(nodes[1], alignment=(1e-3, 0.0, 1e-5))
     with pytest.raises(SelectorError, match="tube 1: it is aligned, and another block would drop that"):
         rig.command("surveys")

@@ -47,10 +47,10 @@ def survey(tube: int, yaw_error_deg: float = 0.0, flags: NodeFlag = NodeFlag.NON
 
 def station_of(folder: Path, *surveys: SurveyMeasurement, **config: Any) -> dict[str, Any] | None:
     """What an operator sees of the one station."""
-    model = RigModel(GroundConfig(folder=folder, **config))
+    model = RigModel.begin(GroundConfig(folder=folder, **config))
     for measurement in surveys:
-        model.on_survey(measurement, MD)
-    return shown_on(model, "stations")["stations"][0] if model.stations else None
+        model.placement.place_one(measurement, MD)
+    return shown_on(model, "stations")["stations"][0] if model.hole.stations else None
 
 
 def test_every_flag_has_its_effect() -> None:
@@ -87,15 +87,15 @@ def test_a_trusted_survey_that_comes_later_takes_the_station_over(tmp_path: Path
 
 
 def test_a_survey_of_a_faulty_sensor_is_set_aside(tmp_path: Path) -> None:
-    model = RigModel(GroundConfig(folder=tmp_path))
-    assert model.on_survey(survey(1, flags=NodeFlag.SENSOR_FAULT), MD) == "survey_set_aside"
-    assert model.stations == []
+    model = RigModel.begin(GroundConfig(folder=tmp_path))
+    assert model.placement.place_one(survey(1, flags=NodeFlag.SENSOR_FAULT), MD) == "survey_set_aside"
+    assert model.hole.stations == []
     assert shown_on(model, "status")["set_aside_measurements"] == 1
 
 
 def test_a_survey_without_rig_time_has_no_depth(tmp_path: Path) -> None:
-    model = RigModel(GroundConfig(folder=tmp_path))
-    assert model.on_survey(survey(1, flags=NodeFlag.CLOCK_UNSYNCHRONISED), MD) == "survey_unplaced"
+    model = RigModel.begin(GroundConfig(folder=tmp_path))
+    assert model.placement.place_one(survey(1, flags=NodeFlag.CLOCK_UNSYNCHRONISED), MD) == "survey_unplaced"
     assert shown_on(model, "status")["unplaced_measurements"] == 1
 
 

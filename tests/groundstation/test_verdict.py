@@ -10,7 +10,16 @@ from hypothesis import strategies as st
 from schemas import check_answer, shown_on
 
 from groundstation.config import GroundConfig
-from groundstation.service.alarms.verdict import WINDS, Doubt, Known, Verdict, Word, direction, judge, wind
+from groundstation.service.alarms.verdict import (
+    WINDS,
+    HoleVerdict,
+    Known,
+    VerdictDoubt,
+    Word,
+    compass_point,
+    deviation_azimuth,
+    judge_hole,
+)
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.rounding import round_to_std, rounded_std
 from groundstation.service.answers.shapes.answer_fields import fields_of_answer
@@ -46,28 +55,31 @@ def known(end: float, worst: float = 0.1, bit: float = 12.0, **more: object) -> 
     ],
 )
 def test_each_level_of_the_tolerance_has_its_word(worst: float, end: float, word: Word) -> None:
-    found = judge(known(end, worst))
+    found = judge_hole(known(end, worst))
     assert (found.word, found.by_surveys) == (word, word)
 
 
 def test_the_line_of_a_hole_that_is_to_be_steered() -> None:
     facts = known(0.9733)
-    assert verdict_line(judge(facts)) == "STEER: ends 43.8 ± 0.2 cm at 253 deg WSW; limit 45 (97 %); act before 13.0 m"
+    assert (
+        verdict_line(judge_hole(facts))
+        == "STEER: ends 43.8 ± 0.2 cm at 253 deg WSW; limit 45 (97 %); act before 13.0 m"
+    )
 
 
 def test_a_hole_that_cannot_be_brought_back_is_out_before_it_is_outside() -> None:
     facts = known(1.5, bit=18.0)
-    assert judge(facts).word is Word.OUT
-    assert "no correction can bring it back" in judge(facts).why[0]
-    assert judge(known(1.5, bit=2.0)).word is Word.STEER
+    assert judge_hole(facts).word is Word.OUT
+    assert "no correction can bring it back" in judge_hole(facts).why[0]
+    assert judge_hole(known(1.5, bit=2.0)).word is Word.STEER
 
 
 def test_too_uncertain_to_tell_is_not_on_target() -> None:
     facts = Known(LENGTH, CURVATURE, 12.0, off(0.1, 12.0), off(0.2, std=0.23))
-    assert judge(facts).word is Word.DONT_KNOW
-    assert judge(facts).doubts == (Doubt.UNCERTAIN,)
+    assert judge_hole(facts).word is Word.DONT_KNOW
+    assert judge_hole(facts).doubts == (VerdictDoubt.UNCERTAIN,)
     nearly = Known(LENGTH, CURVATURE, 12.0, off(0.1, 12.0), off(0.45, std=0.15))
-    assert judge(nearly).word is Word.WATCH
+    assert judge_hole(nearly).word is Word.WATCH
 
 
 @given(
@@ -75,15 +87,15 @@ def test_too_uncertain_to_tell_is_not_on_target() -> None:
     end=st.floats(0.0, 3.0),
     std=st.floats(0.0, 1.0),
     bit=st.none() | st.floats(0.0, LENGTH),
-    doubts=st.lists(st.sampled_from(list(Doubt)), max_size=3),
+    doubts=st.lists(st.sampled_from(list(VerdictDoubt)), max_size=3),
 )
 def test_it_is_never_green_on_what_is_doubtful_and_never_better_than_the_tolerance(
-    worst: float, end: float, std: float, bit: float | None, doubts: list[Doubt]
+    worst: float, end: float, std: float, bit: float | None, doubts: list[VerdictDoubt]
 ) -> None:
     facts = Known(
         LENGTH, CURVATURE, bit, off(worst, 10.0, std=std), off(end, std=std), tuple((d, d.value) for d in doubts)
     )
-    found = judge(facts)
+    found = judge_hole(facts)
     if doubts:
         assert found.word is Word.DONT_KNOW
         assert found.why[: len(doubts)] == tuple(d.value for d in doubts)
@@ -98,7 +110,7 @@ def test_it_is_never_green_on_what_is_doubtful_and_never_better_than_the_toleran
 @given(end=st.floats(0.81, 2.0), bit=st.floats(0.0, LENGTH))
 def test_a_correction_begun_in_time_ends_where_it_says(end: float, bit: float) -> None:
     """Bent back from there by the rig's curvature, the hole ends at the lowest level, or at the limit if late."""
-    found = judge(known(end, bit=bit))
+    found = judge_hole(known(end, bit=bit))
     if found.act_before is None or found.left is None or found.left < 0.0:
         return
     moved = 0.5 * CURVATURE * (LENGTH - found.act_before) ** 2
@@ -109,14 +121,14 @@ def test_a_correction_begun_in_time_ends_where_it_says(end: float, bit: float) -
 
 @given(azimuth_deg=st.floats(-720.0, 720.0))
 def test_the_word_of_a_direction_is_within_its_wind(azimuth_deg: float) -> None:
-    centre = 22.5 * WINDS.index(wind(math.radians(azimuth_deg)))
+    centre = 22.5 * WINDS.index(compass_point(math.radians(azimuth_deg)))
     assert abs((azimuth_deg - centre + 180.0) % 360.0 - 180.0) <= 11.25 + 1e-9
 
 
 def test_north_is_0_and_east_is_90() -> None:
     for towards, word in ((0.0, "N"), (90.0, "E"), (180.0, "S"), (270.0, "W"), (253.0, "WSW")):
-        assert math.degrees(direction(off(1.0, towards_deg=towards))) == pytest.approx(towards)
-        assert wind(math.radians(towards)) == word
+        assert math.degrees(deviation_azimuth(off(1.0, towards_deg=towards))) == pytest.approx(towards)
+        assert compass_point(math.radians(towards)) == word
 
 
 @pytest.mark.parametrize(
@@ -134,7 +146,7 @@ def test_a_standard_deviation_is_never_told_smaller(std: float) -> None:
 
 
 def test_a_ground_station_that_knows_nothing_says_so(tmp_path: Path) -> None:
-    answer = shown_on(RigModel(GroundConfig(folder=tmp_path)), "verdict")
+    answer = shown_on(RigModel.begin(GroundConfig(folder=tmp_path)), "verdict")
     check_answer(answer, fields_of_answer(VerdictAnswer))
     assert answer["verdict"] == "dont_know"
     assert answer["doubts"] == ["no_survey", "clock", "depth", "stale"]
@@ -143,6 +155,6 @@ def test_a_ground_station_that_knows_nothing_says_so(tmp_path: Path) -> None:
 
 def test_a_verdict_without_a_deviation_has_a_line() -> None:
     nothing = Known(LENGTH, CURVATURE)
-    assert judge(nothing) == Verdict(
-        Word.DONT_KNOW, Word.DONT_KNOW, ("no station has been surveyed yet",), (Doubt.NO_SURVEY,)
+    assert judge_hole(nothing) == HoleVerdict(
+        Word.DONT_KNOW, Word.DONT_KNOW, ("no station has been surveyed yet",), (VerdictDoubt.NO_SURVEY,)
     )

@@ -22,7 +22,7 @@ from node.process.tube_process import TubeProcess
 from sim.studies.alignment.run import Setup, Turn
 from sim.world.world import World
 from telemetry.application.commands import COMMANDS, METHOD, SECONDS, TURNS, ObeyedBy
-from telemetry.messages import Command, Event, Mode, NodeState, Reply, Severity, SurveyMeasurement
+from telemetry.messages import Command, Event, NodeMode, NodeState, Reply, Severity, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, SensorParameters
 
 G = 9.81
@@ -114,8 +114,8 @@ def test_an_alignment_tells_every_step_and_finds_the_mount(
     assert found["lean_deg"] == pytest.approx(2.0, abs=0.01)
     assert found["method"] == method
     modes = [state.mode for state in bored.states]
-    assert Mode.ALIGNMENT in modes
-    assert modes[-1] in (Mode.STILL, Mode.SURVEY)
+    assert NodeMode.ALIGNMENT in modes
+    assert modes[-1] in (NodeMode.STILL, NodeMode.SURVEY)
     pitch, roll, std = bored.states[-1].alignment
     assert (pitch, roll) == pytest.approx(TILT, abs=4.0 * std)
     assert bored.tube.alignment["method"] == method

@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from borechain.cli.rig.ground_settings import ground_settings
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.tube import Tube
@@ -18,6 +17,7 @@ from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.filter.resets import open_yaw
 from node.kernels.record.filter_record import Err, default_config
 from node.kernels.record.node_record import new_node
+from sim.rig.ground_settings import ground_settings
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 from telemetry.messages import Aiding, Event

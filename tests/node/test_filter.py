@@ -14,7 +14,7 @@ from node.kernels.filter.float64.fixed_lag import mean_spin
 from node.kernels.record.filter_record import CycleStatus, Err, default_config, new_state
 from node.kernels.record.ring import push_increments
 from node.kernels.string.relay import offer_aiding
-from telemetry.messages import Mode
+from telemetry.messages import NodeMode
 
 START = 1000.0
 TILT = math.radians(2.0)
@@ -86,7 +86,7 @@ def test_static_bias_is_learned_in_fifty_seconds_and_then_yaw_stands() -> None:
         statuses.append(bench.cycle())
     assert CycleStatus.BIAS_KNOWN in statuses[94]
     assert bench.record["static_bias"][2] == pytest.approx(-0.02 * DEG)
-    assert bench.record["mode"] in (Mode.TRACKING, Mode.STILL)
+    assert bench.record["mode"] in (NodeMode.TRACKING, NodeMode.STILL)
     assert bench.record["static_bias_var"][2] > 0.0
 
 
@@ -233,10 +233,10 @@ def test_while_the_joint_is_open_the_node_holds_its_yaw() -> None:
     bench.stand(110)
     held = [bench.cycle(joined=0) for _ in range(200)]
     assert [CycleStatus.JOINT_OPENED in status for status in held] == [True] + [False] * 199
-    assert bench.record["mode"] == Mode.HELD
+    assert bench.record["mode"] == NodeMode.HELD
     assert abs(bench.error_deg()) < 0.01
     assert CycleStatus.JOINT_CLOSED in bench.cycle()
-    assert bench.record["mode"] == Mode.STILL
+    assert bench.record["mode"] == NodeMode.STILL
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])

@@ -93,9 +93,8 @@ def test_an_edited_kernel_is_another(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_processes_of_a_rig_load_no_linear_algebra() -> None:
-    program = (
-        "import borechain.preload, sys; print([name for name in sys.modules if name.count('.') and 'scipy' in name])"
-    )
+    shown = "print([name for name in sys.modules if name.count('.') and 'scipy' in name])"
+    program = f"import borechain.drilling.preload, sys; {shown}"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=250)
     assert "linalg" not in done.stdout
     assert "spatial" not in done.stdout

@@ -17,7 +17,7 @@ from node.kernels.record.node_record import AIDINGS, MISMATCH, new_node
 from node.kernels.sensors.sensor_watch import find_faults
 from node.kernels.turns.aiding_watch import AT_ONCE, find_mismatch, reset_aiding_watch
 from node.kernels.turns.gates import contradicts_gyroscope
-from telemetry.messages import Mode, NodeFlag
+from telemetry.messages import NodeFlag, NodeMode
 
 FLAGGED_WITHIN = 10  # cycles
 LASTS = 25  # cycles
@@ -88,7 +88,7 @@ def healthy() -> StringOfOne:
 def test_a_healthy_sensor_raises_no_alarm(healthy: StringOfOne) -> None:
     assert set(healthy.codes()) == {"bias_known", "started", "stopped", "yaw_reset"}
     assert all(NodeFlag.SENSOR_FAULT not in state.flags for state in healthy.states)
-    assert Mode.FAULT not in {state.mode for state in healthy.states}
+    assert NodeMode.FAULT not in {state.mode for state in healthy.states}
 
 
 @pytest.mark.slow
@@ -104,7 +104,7 @@ def test_a_faulty_gyroscope_is_flagged_and_recovered_from(
     flagged = min(string.first(name, at) for name in names if name in string.codes(at))
     assert flagged - at <= FLAGGED_WITHIN
     assert NodeFlag.SENSOR_FAULT | NodeFlag.YAW_UNTRUSTED in string.states[flagged].flags
-    assert string.states[flagged].mode is Mode.FAULT
+    assert string.states[flagged].mode is NodeMode.FAULT
     recovered = [cycle for cycle, event in string.events if event.code == "sensor_recovered" and cycle >= at]
     assert recovered
     end = at + LASTS if "step" not in kind else flagged
@@ -113,7 +113,7 @@ def test_a_faulty_gyroscope_is_flagged_and_recovered_from(
     assert z[recovered[-1]] < 3.0
     assert np.mean(z[recovered[-1] :] < 3.0) > 0.99
     assert string.states[-1].flags == NodeFlag.NONE
-    assert string.states[-1].mode in (Mode.STILL, Mode.SURVEY)
+    assert string.states[-1].mode in (NodeMode.STILL, NodeMode.SURVEY)
     assert abs(string.error[-1]) < 0.05 * DEG
     untrusted = [NodeFlag.YAW_UNTRUSTED in state.flags for state in string.states]
     unflagged = [k for k in range(at, string.cycles) if not untrusted[k] and z[k] > 5.0 and k > flagged]
@@ -380,7 +380,7 @@ def test_a_reference_at_rest_is_judged_anew_by_a_node_that_turned_unaided(
     nodes = new_node(default_config())
     node = nodes.view(np.recarray)[0]
     state = node.filter
-    state["yaw_known"], state["mode"], state["still_cycles"] = 1, int(Mode.STILL), 10
+    state["yaw_known"], state["mode"], state["still_cycles"] = 1, int(NodeMode.STILL), 10
     state["now"], state["last_aided"], state["stopped_at"] = 60.0, 30.0, stopped_at
     state["now_P"][Err.YAW, Err.YAW] = (0.03 * DEG) ** 2
     assert bool(contradicts_gyroscope.py_func(node, off_deg * DEG, 60.0)) == judged

@@ -14,7 +14,7 @@ from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Scheme, default_config
 from node.kernels.record.node_record import new_node
 from telemetry.frozen import replace
-from telemetry.messages import Aiding, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
+from telemetry.messages import Aiding, Event, NodeFlag, NodeMode, NodeState, SurveyMeasurement
 
 DRIVE, LOWER = MakeUpAngle(0.5, 1e-3), MakeUpAngle(-0.2, 2e-3)
 NOISELESS = SensorLimits(repeats_together=0, repeats_alone=0)
@@ -127,7 +127,7 @@ def test_state_says_what_the_node_does_not_trust() -> None:
     life = Life(tube())
     first = next(m for m in life.cycles(3) if isinstance(m, NodeState))
     assert NodeFlag.BIAS_UNKNOWN in first.flags
-    assert first.mode == Mode.STATIC_BIAS
+    assert first.mode == NodeMode.STATIC_BIAS
     life.cycles(110)
     last = [m for m in life.cycles(6) if isinstance(m, NodeState)][-1]
     assert last.flags == NodeFlag.NONE

@@ -64,7 +64,7 @@ class Beating:
     def _live(self) -> None:
         while not self._stopped.wait(BEAT_S):
             if self._beats.is_set():
-                self.do(lambda rig: rig.speak(len(rig.ground.model.tally.tubes)))  # a second of rig time
+                self.do(lambda rig: rig.speak(len(rig.ground.model.string.tally.tubes)))  # a second of rig time
 
 
 @contextlib.contextmanager

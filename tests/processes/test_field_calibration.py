@@ -16,7 +16,7 @@ from rigs import REPOSITORY, ends, free_endpoint, running_rig
 from groundstation.calibration.block import read_calibration
 from groundstation.calibration.field_calibration import force_inclination
 from groundstation.service.disk.ground_store import Store
-from sim.rig.report import rms
+from sim.rig.report import root_mean_square
 from sim.world.scenario import load_scenario
 from sim.world.world import World
 from telemetry.messages import SurveyMeasurement
@@ -93,7 +93,7 @@ def test_what_is_said_of_before_is_what_an_uncalibrated_rig_shows(
                 errors.append(math.degrees(force_inclination(force)[0]) - truth)
     assert len(errors) == 6
     said = calibrated[0]["calibration"]["inclination_rms_deg"]["before"]
-    assert rms(errors) == pytest.approx(said, rel=0.02)
+    assert root_mean_square(errors) == pytest.approx(said, rel=0.02)
 
 
 def test_a_ground_station_killed_while_it_collects_goes_on_to_its_blocks(tmp_path: Path, ask: Any) -> None:

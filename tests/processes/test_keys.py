@@ -7,15 +7,15 @@ from pathlib import Path
 
 from rigs import REPOSITORY, free_endpoint, running_rig
 
-from borechain.cli.rig.ground_settings import ground_settings
-from borechain.cli.rig.result import result_of
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from borechain.pki.rig_keys import add_tube, init_rig, rotate_keys
-from sim.rig.scheduler import Progress
+from sim.rig.ground_settings import ground_settings
+from sim.rig.rig_result import rig_result
+from sim.rig.scheduler import RigProgress
 from sim.world.scenario import load_scenario
 from sim.world.world import World
 from telemetry.messages import BASE, ENCODER, DepthReading, Side, SurveyMeasurement
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 
 
 def make_keys(folder: Path) -> Path:
@@ -49,7 +49,7 @@ def test_keys_change_in_the_middle_of_a_hole_and_forgers_come_and_no_survey_is_l
     middle = 0.5 * (world.begin + world.end)
     changed: list[float] = []
 
-    def change(progress: Progress) -> None:
+    def change(progress: RigProgress) -> None:
         if not changed and progress.rig_time > middle:
             changed.append(progress.rig_time)
             rotate_keys(keys, datetime.datetime.now(datetime.UTC))
@@ -60,12 +60,12 @@ def test_keys_change_in_the_middle_of_a_hole_and_forgers_come_and_no_survey_is_l
                 for frame in (b"\x01" * 60, b"\x00" * 60):
                     rig.stepper.processes[address].on_frame(Side.LOWER, frame, now)
             now = world.local_clock(BASE, progress.rig_time)
-            rig.stepper.processes[BASE].on_depth(encode(DepthReading(10**9, progress.rig_time, 0.0, ())), now)
+            rig.stepper.processes[BASE].on_depth(encode_message(DepthReading(10**9, progress.rig_time, 0.0, ())), now)
 
     rig = InlineRig(world, ground_settings(world), "rig-1", tmp_path, keys=keys)
     try:
         rig.run(change)
-        result = result_of({path: rig.ask(path) for path in ("stations", "measurements", "column", "alarms")}, world)
+        result = rig_result({path: rig.ask(path) for path in ("stations", "measurements", "column", "alarms")}, world)
         stored = [one.message for one in rig.ground.store.messages()]
         processes = rig.stepper.processes
         newest = {a: processes[a].endpoint.seals.ring.newest for a in (BASE, ENCODER, 1, 2, 3)}  # type: ignore[union-attr]

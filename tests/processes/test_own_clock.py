@@ -29,7 +29,7 @@ from node.process.encoder_command import encoder
 from node.process.tube_command import node
 from node.process.tube_process import TubeProcess
 from sim.can.can_hub import running_hub
-from sim.world.recording import record, turning_once, yaw_error
+from sim.world.recording import record_sensors, turning_once, yaw_error
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seals import Seals, seals_of
 from telemetry.media.can_timing import BitRates
@@ -77,7 +77,7 @@ class String:
     def __init__(self, folder: Path, endpoint: str) -> None:
         self.folder, self.endpoint = folder, endpoint
         self.world = turning_once(1, time.monotonic(), 600.0, 10.0, 700.0, seed=4, clock_std=0.0)
-        record(self.world, folder)
+        record_sensors(self.world, folder)
         self.running: dict[str, Forked] = {}
 
     def start(self, name: str, *options: str) -> None:

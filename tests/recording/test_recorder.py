@@ -7,9 +7,9 @@ import pytest
 from hand_fed import Rig
 from served import Served, serving
 
-from borechain.recording.ground_replay import replay_file
-from borechain.recording.recorder import Recorder
-from borechain.recording.recording_file import Recording
+from groundstation.recording.ground_replay import replay_file
+from groundstation.recording.recorder import Recorder
+from groundstation.recording.recording_file import Recording
 from groundstation.service.process.intake_tape import pack_intake, unpack_intake
 from telemetry.media.zenoh_bus import open_client
 

@@ -18,14 +18,14 @@ from schemas import check_answers
 from tapes import INTAKE, KEY, shown, write
 
 from borechain.cli.ground.record_command import replay as replay_command
-from borechain.cli.rig.ground_settings import ground_settings
-from borechain.inline import InlineRig
-from borechain.recording.ground_replay import replay_file
-from borechain.recording.recording_file import NAME, RecordedSample, Recording, RecordingError, RecordingWriter
+from borechain.drilling.inline import InlineRig
+from groundstation.recording.ground_replay import replay_file
+from groundstation.recording.recording_file import NAME, RecordedSample, Recording, RecordingError, RecordingWriter
 from groundstation.service.answers.answer_table import schemas_by_path
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import IntakeError, pack_intake, unpack_intake
-from sim.rig.scheduler import Progress
+from sim.rig.ground_settings import ground_settings
+from sim.rig.scheduler import RigProgress
 from sim.world.scenario import load_scenario, scenario_of
 from sim.world.world import World
 
@@ -53,7 +53,7 @@ def drilled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Gr
     rig = InlineRig(world, ground_settings(world), "rig-1", folder)
     seen: list[str] = []
 
-    def check(progress: Progress) -> None:
+    def check(progress: RigProgress) -> None:
         """Every answer has the fields of its key in every phase of the run, from the first one on."""
         if rig.is_begun and progress.phase not in seen:
             seen.append(progress.phase)

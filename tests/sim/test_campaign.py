@@ -19,15 +19,15 @@ from node.firmware.tube import Tube
 from node.kernels.record.node_record import AIDING, MOMENT, READING
 from node.kernels.step.address import firmware_addresses
 from sim.campaign import engine
+from sim.campaign.campaign_folder import MANIFEST, Folder
+from sim.campaign.campaign_run import run_campaign
 from sim.campaign.chunk import RUNS, Campaign, run_chunk, scenario_digest
-from sim.campaign.run import run_campaign
-from sim.campaign.store import MANIFEST, Folder
-from sim.campaign.summary import OverRuns, Sum, honesty
+from sim.campaign.summary import OverRuns, Sum, honesty_rows
 from sim.errors import RigError, ScenarioError
 from sim.string.direct_string import DirectString
 from sim.string.drawn_string import frames_of
-from sim.world.disturbance.reading import DRAWN, read_sensors
 from sim.world.disturbance.records import make_shared, make_tubes
+from sim.world.disturbance.sensor_reading import DRAWN, read_sensors
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
 
@@ -139,7 +139,7 @@ def test_every_stop_is_surveyed_and_the_nodes_are_honest() -> None:
     assert np.unique(np.round(surveys["md"], 3)).tolist() == [2.0, 4.0, 6.0]
     assert np.degrees(np.sqrt(np.mean(surveys["inclination_error"] ** 2))) < 0.01
     assert np.all(surveys["trusted"])
-    for row in honesty([chunk.epochs]):
+    for row in honesty_rows([chunk.epochs]):
         assert row["nees_low"] < 1.4, row
         assert row["nees_high"] > 0.6, row
 
@@ -285,7 +285,7 @@ def test_dask_gives_the_same_rows_and_does_again_what_a_killed_worker_had_begun(
 def test_a_cluster_that_is_not_there_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engine, "CONNECT_TIMEOUT", 0.5)
     with pytest.raises(RigError, match=r"tcp://127.0.0.1:1: expected a dask scheduler"):
-        list(engine.compute(pickle.dumps(scenario()), [(1, 1)], "dask", "tcp://127.0.0.1:1"))
+        list(engine.compute_chunks(pickle.dumps(scenario()), [(1, 1)], "dask", "tcp://127.0.0.1:1"))
 
 
 def test_the_scenarios_of_the_program_that_a_campaign_can_express() -> None:

@@ -15,15 +15,15 @@ from sim.campaign.chunk import Campaign
 from sim.errors import ScenarioError
 from sim.string.allowlist import UNUSED, is_expressed, refused_keys
 from sim.string.drawn_string import frames_of
-from sim.string.readings import felt_by
+from sim.string.reading_suppliers import felt_by
 from sim.string.rough_runs import RoughWorld
 from sim.studies.scenarios import Tables, change_sections
 from sim.world.disturbance.chain import lane_starts
+from sim.world.disturbance.disturbance_table import TABLE
 from sim.world.disturbance.lanes import draw_further, draw_numbers
-from sim.world.disturbance.reading import DRAWN, constants_of, read_frames, read_sensors
 from sim.world.disturbance.records import make_shared, make_tubes
 from sim.world.disturbance.row import OneImu
-from sim.world.disturbance.table import TABLE
+from sim.world.disturbance.sensor_reading import DRAWN, constants_of, read_frames, read_sensors
 from sim.world.scenario import Scenario, scenario_of
 from sim.world.scenario_file import ScenarioFile
 from sim.world.world import World

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from borechain.cli.rig.rig_command import PRELOAD
+from borechain.drilling.rig_processes import PRELOAD
 from node.firmware.tube_settings import KERNELS
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Scheme
@@ -20,7 +20,7 @@ from sim.studies.modes import run as modes
 from sim.studies.published_form import published_forms
 from sim.studies.scenarios import Tables, change_sections, on_off
 from sim.studies.trials import rms_deg
-from sim.world.disturbance.white_noise import SAMPLE_RATE_HZ, densities
+from sim.world.disturbance.white_noise import SAMPLE_RATE_HZ, noise_densities
 from sim.world.scenario_file import GyroSection, NodeSection
 
 pytestmark = pytest.mark.slow
@@ -124,7 +124,7 @@ def test_a_plain_encoder_reads_the_middle_of_its_count() -> None:
 
 def test_a_single_sample_has_the_noise_of_its_band() -> None:
     gyroscope = GyroSection()
-    single = densities(gyroscope.model_copy(update={"instantaneous": True}), PERIOD)
+    single = noise_densities(gyroscope.model_copy(update={"instantaneous": True}), PERIOD)
     for one, mean in zip(single, gyroscope.noise_dps_rthz, strict=True):
         assert one / math.sqrt(PERIOD) == pytest.approx(mean * math.sqrt(SAMPLE_RATE_HZ))
 
@@ -135,7 +135,7 @@ def test_every_kernel_can_be_chosen_and_is_warmed_before_the_first_fork() -> Non
     assert [NodeSection(kernel=kernel).kernel for kernel in KERNELS] == list(KERNELS)
     assert set(PRELOAD) == set(KERNELS)
     program = (
-        "import borechain.preload_all\n"
+        "import borechain.drilling.preload_all\n"
         "from node.kernels.step import node_step as step\n"
         "from node.kernels.step import fixed_step as fixed\n"
         "steps = (step.node_step, fixed.fixed_step)\n"

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sim.world.disturbance.philox import normals, philox, uniforms
+from sim.world.disturbance.philox import fill_normal, fill_uniform, philox_words
 
 # kat_vectors of the authors' library, philox4x32-10
 KNOWN = [
@@ -22,14 +22,14 @@ KNOWN = [
 @pytest.mark.parametrize(("counter", "key", "answer"), KNOWN)
 def test_published_answers(counter: tuple[int, ...], key: tuple[int, ...], answer: tuple[int, ...]) -> None:
     words = np.zeros(4, np.uint64)
-    philox(np.array(counter, np.uint64), np.array(key, np.uint64), words)
+    philox_words(np.array(counter, np.uint64), np.array(key, np.uint64), words)
     assert tuple(words.tolist()) == answer
 
 
 def drawn(key: int, cycle: int, count: int) -> np.ndarray:
     numbers = np.zeros(count)
     counter = np.array([cycle, 3, 0, 0], np.uint64)
-    uniforms(counter, np.array([key, 0], np.uint64), np.zeros(4, np.uint64), numbers)
+    fill_uniform(counter, np.array([key, 0], np.uint64), np.zeros(4, np.uint64), numbers)
     return numbers
 
 
@@ -43,7 +43,7 @@ def test_numbers_are_inside_the_unit_interval_and_spread_evenly() -> None:
 
 def test_normal_numbers_have_the_moments_of_their_distribution() -> None:
     numbers = drawn(7, 1, 200_000)
-    normals(numbers)
+    fill_normal(numbers)
     for power, moment, spread in ((1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)):
         assert abs(np.mean(numbers**power) - moment) < 4.0 * math.sqrt(spread / len(numbers))
     assert abs(np.corrcoef(numbers[::2], numbers[1::2])[0, 1]) < 4.0 / math.sqrt(len(numbers) / 2)

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from groundstation.calibration.attitudes import true_vectors
 from node.kernels.arithmetic.formats import PERIOD
 from sim.errors import ScenarioError
-from sim.rig.scheduler import Progress, Scheduler
+from sim.rig.scheduler import RigProgress, Scheduler
 from sim.world.disturbance.drift import Drift
 from sim.world.rack import Rack
 from sim.world.scenario import Scenario, load_scenario
@@ -154,7 +154,7 @@ def test_an_operator_waits_for_a_ground_station_that_does_not_know_the_time_yet(
     rig = InlineRig(world, {}, "rig-1", tmp_path)
     cues: list[str] = []
 
-    def follow(progress: Progress) -> None:
+    def follow(progress: RigProgress) -> None:
         rig.stepper.follow(progress)
         if progress.cue:
             cues.append(progress.cue)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from sim.errors import ScenarioError
 from sim.rig.link_channel import LinkChannel
-from sim.rig.radio_channel import RadioChannel, failures
+from sim.rig.radio_channel import RadioChannel, failed_attempts
 from sim.studies.soil_link.delivery_time import STEP, LossyJoint, joint_delay, message_delay, quantile
 from sim.world.radio import RadioLinks
 from sim.world.radio_section import RadioSection
@@ -71,13 +71,13 @@ def test_fades_and_bursts_are_of_the_joint_and_the_seed() -> None:
 @pytest.mark.slow
 def test_attempts_fail_with_the_power_of_the_error_rate(error_rate: float, attempts: int) -> None:
     fates = (np.arange(20_000) + 0.5) / 20_000
-    share = np.mean([failures(fate, error_rate) >= attempts for fate in fates])
+    share = np.mean([failed_attempts(fate, error_rate) >= attempts for fate in fates])
     assert share == pytest.approx(error_rate**attempts, abs=2e-4)
 
 
 def test_a_frame_without_a_chance_is_lost_and_one_without_a_risk_is_not() -> None:
-    assert failures(0.0, 0.0) == failures(0.999, 0.0) == 0
-    assert failures(0.0, 0.5) == failures(0.3, 1.0) == math.inf
+    assert failed_attempts(0.0, 0.0) == failed_attempts(0.999, 0.0) == 0
+    assert failed_attempts(0.0, 0.5) == failed_attempts(0.3, 1.0) == math.inf
 
 
 def test_loss_and_delay_follow_from_the_margin() -> None:

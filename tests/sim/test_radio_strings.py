@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from borechain.cli.rig.ground_settings import ground_settings
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from node.process.tube_process import TubeProcess
-from sim.rig.scheduler import Progress
+from sim.rig.ground_settings import ground_settings
+from sim.rig.scheduler import RigProgress
 from sim.studies.soil_link.wet_clay import expected_delivery, largest_difference, surveys_of, wet_clay
-from sim.world.marks import wrap
+from sim.world.marks import wrap_angle
 from sim.world.parsing import read_toml
 from sim.world.scenario import scenario_of
 from sim.world.world import World
@@ -47,7 +47,7 @@ def drill(folder: Path, **radio: Any) -> Drilled:
     rig = InlineRig(world, ground_settings(world), "pipe", folder)
     drilled = Drilled(rig, world)
 
-    def watch(progress: Progress) -> None:
+    def watch(progress: RigProgress) -> None:
         after = progress.rig_time - world.begin
         if not KILLED < after < KILLED + DOWN:
             return
@@ -74,8 +74,8 @@ def test_tubes_below_a_dead_one_keep_their_yaw(pipe: Drilled) -> None:
     assert len(surveys) == 4
     for survey in surveys:
         at = survey["station_at_s"]
-        error = wrap(math.radians(survey["yaw_deg"]) - pipe.world.yaw_truth(survey["tube"], at))
-        own = math.degrees(wrap(error - pipe.world.systematic_error(survey["tube"], at)))
+        error = wrap_angle(math.radians(survey["yaw_deg"]) - pipe.world.yaw_truth(survey["tube"], at))
+        own = math.degrees(wrap_angle(error - pipe.world.systematic_error(survey["tube"], at)))
         assert abs(own) < 5.0 * survey["sigma_yaw_deg"]
         assert survey["sigma_yaw_deg"] < 0.02
         assert survey["flags"] == []

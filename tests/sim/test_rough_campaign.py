@@ -24,12 +24,12 @@ from sim.studies.scenarios import Tables, change_sections
 from sim.studies.worlds.run import rough_world
 from sim.world.disturbance import fifo
 from sim.world.disturbance.frame_layout import FINER
-from sim.world.disturbance.frame_sums import Field
+from sim.world.disturbance.frame_sums import FrameField
 from sim.world.disturbance.frame_vibration import Vibration
 from sim.world.disturbance.low_pass import low_passed
-from sim.world.disturbance.reading import DRAWN, read_frames
 from sim.world.disturbance.records import make_shared, make_tubes
 from sim.world.disturbance.row import OneImu
+from sim.world.disturbance.sensor_reading import DRAWN, read_frames
 from sim.world.disturbance.vibration import band_noise
 from sim.world.disturbance.white_noise import add_part_noise
 from sim.world.scenario import Scenario, load_scenario, scenario_of
@@ -72,10 +72,10 @@ def without_noise(scenario: Scenario) -> Scenario:
 
 
 @pytest.fixture
-def alike(monkeypatch: pytest.MonkeyPatch) -> Callable[[Field], None]:
+def alike(monkeypatch: pytest.MonkeyPatch) -> Callable[[FrameField], None]:
     """Have the frames of a world's FIFOs come when those of a campaign's run do, to which half a place is nothing."""
 
-    def follow(field: Field) -> None:
+    def follow(field: FrameField) -> None:
         def frame_times(imu: OneImu, t: np.ndarray) -> np.ndarray:
             front, own = field.front_end[0], field.fifos[imu.tube - 1]
             first = front["first"] + front["frame"] * (own["row"] + own["share"]) / FINER
@@ -88,7 +88,7 @@ def alike(monkeypatch: pytest.MonkeyPatch) -> Callable[[Field], None]:
 
 @pytest.mark.parametrize("name", ["straight", "rough"])
 def test_without_noise_every_sensor_reads_what_it_reads_in_the_rough_world(
-    name: str, alike: Callable[[Field], None]
+    name: str, alike: Callable[[FrameField], None]
 ) -> None:
     """To less than the noise of a reading, 2e-4 rad/s and 3e-3 m/s^2, and mostly to less than a tenth of that.
 
@@ -127,7 +127,7 @@ def test_without_noise_every_sensor_reads_what_it_reads_in_the_rough_world(
             assert np.allclose(rows[:, column], values, rtol=0.0, atol=1e-9), column
 
 
-def test_without_noise_the_nodes_err_as_those_of_a_rig_of_the_same_seed(alike: Callable[[Field], None]) -> None:
+def test_without_noise_the_nodes_err_as_those_of_a_rig_of_the_same_seed(alike: Callable[[FrameField], None]) -> None:
     """To 0.002 deg in the median; a node that decides otherwise by a hair is still within half a sigma."""
     scenario = without_noise(field_of(rig={"tubes": 3}, aiding={"on_s": 20.0, "off_s": 30.0}))
     made, apart = Campaign(scenario), []

@@ -15,7 +15,7 @@ from sim.world.disturbance.vibration import band_noise
 from sim.world.rough_disc import RoughDisc
 from sim.world.rough_motion import RoughMotion
 from sim.world.rough_section import RoughEncoderSection, RoughSection
-from sim.world.rough_truth import transported
+from sim.world.rough_truth import transport_angle
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 
@@ -112,7 +112,7 @@ def test_a_twist_comes_and_goes() -> None:
 def test_a_shaft_in_a_bent_hole_turns_by_the_solid_angle() -> None:
     inclination, turn = math.radians(30.0), math.radians(20.0)
     hole = Borehole.spiral(inclination, 0.0, turn, 10.0)
-    assert transported(hole, np.array([10.0]))[0] == pytest.approx((1.0 - math.cos(inclination)) * turn, rel=1e-3)
+    assert transport_angle(hole, np.array([10.0]))[0] == pytest.approx((1.0 - math.cos(inclination)) * turn, rel=1e-3)
     spiral = {"spiral": {"inclination_deg": 30.0, "turn_deg": 20.0}}
     tables = change_sections(SHORT, **QUIET)
     shaft = World(scenario_of({**tables, "path": spiral, "rough": {"string": {"transport": "parallel"}}}), 3)

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.world.marks import wrap
+from sim.world.marks import wrap_angle
 from sim.world.motion import Motion, Trapezoid
 from sim.world.scenario import load_scenario
 from sim.world.scenario_file import TorsionSection
-from sim.world.torsion import StringTorsion, polar_moment, smooth_step, stiffness
+from sim.world.torsion import StringTorsion, polar_moment, smooth_step, torsional_stiffness
 from sim.world.world import World
 
 SCENARIO = load_scenario(Path(__file__).parents[2] / "scenarios" / "torsion-10.toml")
@@ -40,7 +40,7 @@ def at_rest(block: int = 0) -> float:
 def test_the_printed_twist_of_one_tube_and_of_fifty() -> None:
     """60/50 mm tube of 3 m at 500 N m: 1.65 deg, and 82 deg in a string of 50."""
     assert polar_moment(0.060, 0.050) == pytest.approx(6.588e-7, rel=1e-4)
-    assert math.degrees(500.0 / stiffness(TorsionSection(), 3.0)) == pytest.approx(1.65, abs=0.005)
+    assert math.degrees(500.0 / torsional_stiffness(TorsionSection(), 3.0)) == pytest.approx(1.65, abs=0.005)
     lag = string(TorsionSection(), 50)
     now = np.array([drilling()])
     assert math.degrees(lag.twist(50, now)[0][0]) == pytest.approx(1.65, abs=0.005)
@@ -67,7 +67,7 @@ def test_wall_friction_is_felt_by_what_is_above_it() -> None:
     s = (np.arange(12_000) + 0.5) * 1e-3  # m above the bit
     torque = 100.0 + 40.0 * np.minimum(s, depth)
     for tube in (1, 2, 3, 4):
-        expected = torque[s > (tube - 1) * 3.0].sum() * 1e-3 / (stiffness(section, 3.0) * 3.0)
+        expected = torque[s > (tube - 1) * 3.0].sum() * 1e-3 / (torsional_stiffness(section, 3.0) * 3.0)
         assert lag.twist(tube, now)[0][0] == pytest.approx(expected, rel=1e-6)
     assert lag.torque(now)[0] == pytest.approx(100.0 + 40.0 * depth)
 
@@ -116,7 +116,7 @@ def test_the_marks_explain_the_yaw_of_a_twisted_string_but_for_the_systematic_er
         head = float(world.motion.drive(np.array([t]))[0][0])
         for tube in (1, phase.tube):
             known = head + marks[tube].drive_joint.angle  # joints are solved: the mark of when it was on top stands
-            off = wrap(known - world.yaw_truth(tube, t) - world.systematic_error(tube, t))
+            off = wrap_angle(known - world.yaw_truth(tube, t) - world.systematic_error(tube, t))
             assert off == pytest.approx(0.0, abs=1e-9)
         trapped = float(world.torsion.twist(1, np.array([t]))[0][0])
         assert 0.0 < trapped < math.radians(1.0)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from groundstation.survey.fusion.resolve import direction_angles, resolve_direction
 from node.kernels.arithmetic.formats import PERIOD
 from sim.world.borehole import Borehole
-from sim.world.marks import wrap
+from sim.world.marks import wrap_angle
 from sim.world.motion import Motion, Trapezoid
 from sim.world.scenario import load_scenario
 from sim.world.scenario_file import TorsionSection
@@ -98,7 +98,7 @@ def test_specific_force_at_a_stop_resolves_to_the_exact_direction(name: str) -> 
             station = world.truth_station(world.bit_depth(float(t[0])) - (tube - 1) * 2.0)
             assert math.degrees(inclination) == pytest.approx(station["inclination_deg"], abs=1e-9)
             off = math.radians(math.degrees(azimuth) - station["azimuth_deg"])
-            assert abs(wrap(off)) * math.sin(inclination) < 1e-9
+            assert abs(wrap_angle(off)) * math.sin(inclination) < 1e-9
 
 
 @pytest.mark.slow

@@ -8,11 +8,11 @@ import pytest
 
 from node.kernels.arithmetic.formats import PERIOD
 from sim.errors import ScenarioError
-from sim.world.disturbance.converter import clip_rates, quantise
-from sim.world.disturbance.reading import read_means
+from sim.world.disturbance.converter import clip_rates, quantise_rates
 from sim.world.disturbance.row import ImuSamples, OneImu
+from sim.world.disturbance.sensor_reading import read_means
 from sim.world.disturbance.wander import gauss_markov
-from sim.world.marks import wrap
+from sim.world.marks import wrap_angle
 from sim.world.scenario import load_scenario
 from sim.world.scenario_file import GyroSection
 from sim.world.world import World
@@ -58,7 +58,7 @@ def test_white_noise_is_the_angle_random_walk() -> None:
 def test_a_gyroscope_saturates_and_has_steps() -> None:
     rates = np.radians(np.array([[-900.0, 0.0014, 900.0]]))
     samples, imu = ImuSamples(np.zeros(1), rates, rates, np.zeros(1)), one_imu(GyroSection(resolution_dps=0.0026))
-    for act in (quantise, clip_rates):
+    for act in (quantise_rates, clip_rates):
         act(samples, imu, None)
     np.testing.assert_allclose(np.degrees(samples.rate), [[-500.0, 0.0026, 500.0]], atol=1e-9)
 
@@ -76,7 +76,7 @@ def test_readings_of_the_marks_explain_the_yaw_but_for_the_systematic_error() ->
         for tube in range(1, top + 1):
             above = sum(settings[k].lower_joint.angle for k in range(tube + 1, top + 1))
             known = head + settings[top].drive_joint.angle + above
-            off = wrap(known - world.yaw_truth(tube, t) - world.systematic_error(tube, t))
+            off = wrap_angle(known - world.yaw_truth(tube, t) - world.systematic_error(tube, t))
             assert off == pytest.approx(0.0, abs=1e-9)
 
 
@@ -84,8 +84,8 @@ def test_a_tube_keeps_its_yaw_while_another_is_added_above() -> None:
     world = World(SCENARIO, 3)
     added = next(p for p in world.phases if p.kind == "add" and p.tube == 2)
     assert world.yaw_truth(1, added.start) == world.yaw_truth(1, added.end)
-    before = wrap(world.systematic_error(1, added.joint_closed - 0.1))
-    after = wrap(world.systematic_error(1, added.joint_closed + 0.1))
+    before = wrap_angle(world.systematic_error(1, added.joint_closed - 0.1))
+    after = wrap_angle(world.systematic_error(1, added.joint_closed + 0.1))
     assert before != after  # what is known of it comes through other joints now
 
 

@@ -20,7 +20,7 @@ from telemetry.media.can_port import CanPort
 from telemetry.media.media_table import open_medium
 from telemetry.media.port import TubeEnd
 from telemetry.messages import ENCODER, Aiding, Event, Severity, Side
-from telemetry.presentation.can_native import rounded
+from telemetry.presentation.can_native import rounded_message
 
 PATIENCE = 60.0  # s
 SETTINGS = ("frames=fd", "frames=classic", "frames=fd,profile=native", "frames=classic,profile=native")
@@ -76,7 +76,7 @@ class Joint:
         self._number += 1
         encoder, tube = self.encoder, self.tube
         self.until("the clock", lambda: tube.endpoint.place.neighbours[Side.UPPER] and tube.endpoint.clock.synchronised)
-        sent = rounded(Aiding(1.0, 1e-6, 0.0, 0.0, 0.1, 100.0 + self._number, self._number, 0, epoch=1))
+        sent = rounded_message(Aiding(1.0, 1e-6, 0.0, 0.0, 0.1, 100.0 + self._number, self._number, 0, epoch=1))
         event = Event(1, tube.endpoint.mail.series.take(), 5.0, Severity.INFO, "booted", {"number": self._number})
         tube.endpoint.mail.submit(event, time.monotonic())
         sent_at = -1.0

@@ -22,20 +22,20 @@ from telemetry.application.end_seal import OVERHEAD as END_OVERHEAD
 from telemetry.application.end_to_end import KEPT_WAIT
 from telemetry.media.port import Priority
 from telemetry.messages import BASE, ENCODER, Side
-from telemetry.presentation.msgpack_codec import encode, open_payload
-from telemetry.schema import Kind
+from telemetry.presentation.msgpack_codec import encode_message, open_payload
+from telemetry.schema import MessageKind
 from telemetry.transport.joint_seal import HEAD, PROOF_WITHIN, SETTLED
 from telemetry.transport.seal import TAG_SIZE, WINDOW, SealKey
 
 PAGE = Path(__file__).parents[2] / "docs" / "seals.md"
-ONE_HOP = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY)
+ONE_HOP = (MessageKind.AIDING, MessageKind.HELLO, MessageKind.TIME_REQUEST, MessageKind.TIME_REPLY)
 UP = (
-    Kind.NODE_STATE,
-    Kind.SURVEY_MEASUREMENT,
-    Kind.REPLY,
-    Kind.EVENT,
-    Kind.BLOCK_STATUS,
-    Kind.STATIC_RECORD,
+    MessageKind.NODE_STATE,
+    MessageKind.SURVEY_MEASUREMENT,
+    MessageKind.REPLY,
+    MessageKind.EVENT,
+    MessageKind.BLOCK_STATUS,
+    MessageKind.STATIC_RECORD,
 )
 END_TO_END = (*UP, *DOWN)
 ON_A_JOINT = (*ONE_HOP, *END_TO_END)
@@ -53,7 +53,7 @@ class Outcome:
     counted: dict[str, int]
 
 
-def recorded(folder: Path, kind: Kind, repeats: int = 3) -> SealedString:
+def recorded(folder: Path, kind: MessageKind, repeats: int = 3) -> SealedString:
     """A string that has said messages of a kind; what crossed its joints is noted."""
     string = SealedString(folder)
     string.settle()
@@ -79,42 +79,42 @@ def attempt(string: SealedString, made: list[tuple[tuple[int, Side], bytes]]) ->
 # on a joint --------------------------------------------------------------------------------------------------------
 
 
-def joint_attack(change: Callable[[SealedString, Kind, list[bytes]], Iterable[bytes]]) -> Callable[..., Outcome]:
-    def attack(string: SealedString, kind: Kind) -> Outcome:
+def joint_attack(change: Callable[[SealedString, MessageKind, list[bytes]], Iterable[bytes]]) -> Callable[..., Outcome]:
+    def attack(string: SealedString, kind: MessageKind) -> Outcome:
         frames = list(change(string, kind, string.evidence))
         return attempt(string, [(string.end_of(kind), frame) for frame in frames])
 
     return attack
 
 
-def forged(_string: SealedString, _kind: Kind, frames: list[bytes]) -> Iterable[bytes]:
+def forged(_string: SealedString, _kind: MessageKind, frames: list[bytes]) -> Iterable[bytes]:
     for frame in frames:
         yield frame[HEAD.size : -TAG_SIZE]  # as before there were seals
         yield frame[:-TAG_SIZE] + FOREIGN.tag(frame[:-TAG_SIZE])
 
 
-def same_session(string: SealedString, _kind: Kind, frames: list[bytes]) -> Iterable[bytes]:
+def same_session(string: SealedString, _kind: MessageKind, frames: list[bytes]) -> Iterable[bytes]:
     string.run(1.0)
     yield from frames
 
 
-def old_session(string: SealedString, kind: Kind, frames: list[bytes]) -> Iterable[bytes]:
+def old_session(string: SealedString, kind: MessageKind, frames: list[bytes]) -> Iterable[bytes]:
     restart(string, string.end_of(kind)[0])
     yield from frames
 
 
-def after_both_restart(string: SealedString, kind: Kind, frames: list[bytes]) -> Iterable[bytes]:
+def after_both_restart(string: SealedString, kind: MessageKind, frames: list[bytes]) -> Iterable[bytes]:
     del kind
     restart(string, BASE, ENCODER, 2, 1)
     yield from frames
 
 
-def long_ago(string: SealedString, kind: Kind, frames: list[bytes]) -> Iterable[bytes]:
+def long_ago(string: SealedString, kind: MessageKind, frames: list[bytes]) -> Iterable[bytes]:
     let_pass(string, string.end_of(kind))
     yield from frames
 
 
-def held_back(string: SealedString, kind: Kind, _frames: list[bytes]) -> Iterable[bytes]:
+def held_back(string: SealedString, kind: MessageKind, _frames: list[bytes]) -> Iterable[bytes]:
     """Frames that arrive only after 64 later ones."""
     end, held, take = string.end_of(kind), [], string._deliver
 
@@ -138,19 +138,19 @@ def let_pass(string: SealedString, end: tuple[int, Side]) -> None:
     string.run(120.0, lambda: len(string.wire[end]) > begun + WINDOW + 1)
 
 
-def truncated(_string: SealedString, _kind: Kind, frames: list[bytes]) -> Iterable[bytes]:
+def truncated(_string: SealedString, _kind: MessageKind, frames: list[bytes]) -> Iterable[bytes]:
     yield from (frames[0][:n] for n in range(0, len(frames[0]), 7))
     yield from (frames[0][:-1], frames[0][1:])
 
 
-def spliced(string: SealedString, kind: Kind, frames: list[bytes]) -> Iterable[bytes]:
+def spliced(string: SealedString, kind: MessageKind, frames: list[bytes]) -> Iterable[bytes]:
     first, last = frames[0], string.wire[string.end_of(kind)][-1]
     yield last[: HEAD.size] + first[HEAD.size : -TAG_SIZE] + last[-TAG_SIZE:]
     yield first[: HEAD.size] + last[HEAD.size :]
     yield first[:-TAG_SIZE] + last[-TAG_SIZE:]
 
 
-def wrong_joint(string: SealedString, kind: Kind) -> Outcome:
+def wrong_joint(string: SealedString, kind: MessageKind) -> Outcome:
     frames, right = string.evidence, string.end_of(kind)
     ends = [end for end in string.wire if end != right and end not in ((BASE, Side.UPPER), (1, Side.LOWER))]
     return attempt(string, [(end, frame) for end in ends for frame in frames])
@@ -159,10 +159,12 @@ def wrong_joint(string: SealedString, kind: Kind) -> Outcome:
 # end to end --------------------------------------------------------------------------------------------------------
 
 
-def payload_attack(change: Callable[[SealedString, Kind, list[bytes]], Iterable[bytes]]) -> Callable[..., Outcome]:
+def payload_attack(
+    change: Callable[[SealedString, MessageKind, list[bytes]], Iterable[bytes]],
+) -> Callable[..., Outcome]:
     """What a stolen tube 2 hands on, in frames that it seals itself."""
 
-    def attack(string: SealedString, kind: Kind) -> Outcome:
+    def attack(string: SealedString, kind: MessageKind) -> Outcome:
         payloads = [p for frame in string.evidence for k, p in messages_in(frame) if k is kind]
         made = list(change(string, kind, payloads))
         thief = string.endpoints[2]._links[Side.LOWER if kind in DOWN else Side.UPPER]
@@ -178,18 +180,18 @@ def payload_attack(change: Callable[[SealedString, Kind, list[bytes]], Iterable[
     return attack
 
 
-def heard(string: SealedString, kind: Kind) -> object:
+def heard(string: SealedString, kind: MessageKind) -> object:
     """What the victim has heard of a kind, and what tube 1 still keeps.
 
     A part of a block, and what a tube says of it, may come as often as they like: both name the whole state.
     """
     victim = 1 if kind in DOWN else BASE
-    of_kind = [m for m in string.heard[victim] if open_payload(encode(m)).kind is kind]
-    repeatable = kind in (Kind.BLOCK_SEGMENT, Kind.BLOCK_STATUS)
+    of_kind = [m for m in string.heard[victim] if open_payload(encode_message(m)).kind is kind]
+    repeatable = kind in (MessageKind.BLOCK_SEGMENT, MessageKind.BLOCK_STATUS)
     return list(dict.fromkeys(of_kind)) if repeatable else of_kind, string.endpoints[1].mail.outbox_size
 
 
-def forged_payload(string: SealedString, kind: Kind, payloads: list[bytes]) -> Iterable[bytes]:
+def forged_payload(string: SealedString, kind: MessageKind, payloads: list[bytes]) -> Iterable[bytes]:
     """Unsealed, under a key of no rig, and under the thief's own key."""
     thief = string.seals(2).ring.seal_key(1, "end", 2)
     assert thief is not None
@@ -201,34 +203,34 @@ def forged_payload(string: SealedString, kind: Kind, payloads: list[bytes]) -> I
             yield head + key.tag(way, bytes([tube]), head, content) + content
 
 
-def payload_of_old_session(string: SealedString, kind: Kind, payloads: list[bytes]) -> Iterable[bytes]:
+def payload_of_old_session(string: SealedString, kind: MessageKind, payloads: list[bytes]) -> Iterable[bytes]:
     restart(string, 1 if kind in DOWN else BASE)
     yield from payloads
 
 
-def payload_after_reboot(string: SealedString, _kind: Kind, payloads: list[bytes]) -> Iterable[bytes]:
+def payload_after_reboot(string: SealedString, _kind: MessageKind, payloads: list[bytes]) -> Iterable[bytes]:
     restart(string, 1)
     yield from payloads
 
 
-def payload_of_long_ago(string: SealedString, _kind: Kind, payloads: list[bytes]) -> Iterable[bytes]:
+def payload_of_long_ago(string: SealedString, _kind: MessageKind, payloads: list[bytes]) -> Iterable[bytes]:
     """Of before 64 later orders, which is what a tube remembers."""
     for _ in range(66):
-        string.say(Kind.COMMAND)
+        string.say(MessageKind.COMMAND)
         string.run(0.3)
     yield from payloads[-3:]
 
 
-def truncated_payload(_string: SealedString, _kind: Kind, payloads: list[bytes]) -> Iterable[bytes]:
+def truncated_payload(_string: SealedString, _kind: MessageKind, payloads: list[bytes]) -> Iterable[bytes]:
     yield payloads[0][:END_OVERHEAD] + b"\x80"
     yield payloads[0][: END_OVERHEAD - 1]
     yield payloads[0][:-1]
     yield payloads[0][:-1] + bytes([payloads[0][-1] ^ 1])
 
 
-def spliced_payload(string: SealedString, kind: Kind, payloads: list[bytes]) -> Iterable[bytes]:
+def spliced_payload(string: SealedString, kind: MessageKind, payloads: list[bytes]) -> Iterable[bytes]:
     """The seal of one message with what another says, and the other way round."""
-    string.say(Kind.EVENT if kind is not Kind.EVENT else Kind.NODE_STATE)
+    string.say(MessageKind.EVENT if kind is not MessageKind.EVENT else MessageKind.NODE_STATE)
     string.run(ARRIVED)
     others = [p for frame in string.wire[BASE, Side.LOWER] for k, p in messages_in(frame) if k is not kind]
     others = [p for p in others if p[0] == payloads[0][0]]
@@ -236,7 +238,7 @@ def spliced_payload(string: SealedString, kind: Kind, payloads: list[bytes]) -> 
     yield others[-1][:END_OVERHEAD] + payloads[0][END_OVERHEAD:]
 
 
-def same_session_payload(_string: SealedString, _kind: Kind, payloads: list[bytes]) -> Iterable[bytes]:
+def same_session_payload(_string: SealedString, _kind: MessageKind, payloads: list[bytes]) -> Iterable[bytes]:
     yield from payloads[-3:]
 
 
@@ -250,7 +252,7 @@ def restart(string: SealedString, *addresses: int) -> None:
     string.run(SETTLED + 1.0)
 
 
-Attack = Callable[[SealedString, Kind], Outcome]
+Attack = Callable[[SealedString, MessageKind], Outcome]
 JOINT_ATTACKS: dict[str, Attack] = {
     "forged": joint_attack(forged),
     "truncated": joint_attack(truncated),
@@ -273,13 +275,13 @@ END_ATTACKS: dict[str, Attack] = {
 }  # in this order on one string
 
 
-def outcomes(folder: Path, kind: Kind, attacks: dict[str, Attack]) -> dict[str, Outcome]:
+def outcomes(folder: Path, kind: MessageKind, attacks: dict[str, Attack]) -> dict[str, Outcome]:
     """Outcome of each attack on one kind of message."""
     string = recorded(folder, kind)
     return {name: attack(string, kind) for name, attack in attacks.items()}
 
 
-def name_of(kind: Kind) -> str:
+def name_of(kind: MessageKind) -> str:
     return kind.name.lower().replace("_", " ")
 
 
@@ -293,7 +295,7 @@ def cell(outcome: Outcome) -> str:
     return ", ".join(name.removeprefix("seal_").removeprefix("end_").replace("_", " ") for name in names) or "no effect"
 
 
-def table(folder: Path, attacks: dict[str, Attack], kinds: Iterable[Kind]) -> str:
+def table(folder: Path, attacks: dict[str, Attack], kinds: Iterable[MessageKind]) -> str:
     lines = ["| message | " + " | ".join(attacks) + " |", "|---" * (len(attacks) + 1) + "|"]
     for kind in kinds:
         cells = [cell(outcome) for outcome in outcomes(folder, kind, attacks).values()]

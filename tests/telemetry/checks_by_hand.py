@@ -26,7 +26,7 @@ from telemetry.quantities import (
     check_number,
     check_text,
 )
-from telemetry.schema import LARGEST_TIME, MAX_EPOCH, Field
+from telemetry.schema import LARGEST_TIME, MAX_EPOCH, MessageField
 
 LARGEST_COVARIANCE, LARGEST_FORCE = 1e6, 1e3  # (m/s^2)^2 and the like, m/s^2
 
@@ -49,7 +49,7 @@ class ByHand:
         return copy(self.before)
 
 
-def by_hand(field: Field) -> ByHand:
+def by_hand(field: MessageField) -> ByHand:
     """Checks of one line of the schema."""
     check, pack = CHECKS[field.kind]
     checked: Callable[[Any], Any] = partial(check, field)
@@ -58,7 +58,7 @@ def by_hand(field: Field) -> ByHand:
     return ByHand(field.name, field.key, checked, pack, field.since, field.before)
 
 
-def check_member(field: Field, value: Any) -> enum.IntEnum | enum.IntFlag:
+def check_member(field: MessageField, value: Any) -> enum.IntEnum | enum.IntFlag:
     """A member or flags of their number."""
     assert field.enumeration is not None
     return field.enumeration(check_integer(field, value))

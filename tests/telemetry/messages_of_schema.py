@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from telemetry.messages import ImuMean, Stand
 from telemetry.quantities import MAX_IMUS, MAX_LIST, MAX_STANDS, ValueKind
-from telemetry.schema import SCHEMA, SPEC_OF, Field
+from telemetry.schema import SCHEMA, SPEC_OF, MessageField
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 SCALAR = st.none() | st.booleans() | st.integers(-(2**63), 2**63 - 1) | FINITE | st.text(max_size=50)
@@ -19,7 +19,7 @@ def vector(limit: float) -> st.SearchStrategy[tuple[float, float, float]]:
     return st.tuples(*[st.floats(-limit, limit)] * 3)
 
 
-def integers(field: Field) -> st.SearchStrategy[int]:
+def integers(field: MessageField) -> st.SearchStrategy[int]:
     whole = st.integers(int(field.low), int(field.high))
     if field.enumeration is None:
         return whole
@@ -27,7 +27,7 @@ def integers(field: Field) -> st.SearchStrategy[int]:
     return known | whole.map(field.enumeration)
 
 
-def values(field: Field) -> st.SearchStrategy[Any]:
+def values(field: MessageField) -> st.SearchStrategy[Any]:
     """Anything that a field may hold."""
     match field.kind:
         case ValueKind.NUMBER:

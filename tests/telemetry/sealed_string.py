@@ -25,8 +25,8 @@ from telemetry.messages import (
     ImuMean,
     Kept,
     Message,
-    Mode,
     NodeFlag,
+    NodeMode,
     NodeState,
     Reply,
     Severity,
@@ -36,7 +36,7 @@ from telemetry.messages import (
     UploadPhase,
 )
 from telemetry.presentation.msgpack_codec import open_payload
-from telemetry.schema import Kind
+from telemetry.schema import MessageKind
 from telemetry.transport.hop import parse_frame
 from telemetry.transport.joint_seal import HEAD, OVERHEAD
 from telemetry.transport.key_ring import key_file
@@ -115,25 +115,25 @@ class SealedString:
         self.run(1.0)
         assert all(self.endpoints[address].mail.outbox_size == 0 for address in (2, 1))
 
-    def say(self, kind: Kind) -> None:
+    def say(self, kind: MessageKind) -> None:
         """Have a message of a kind said by who says it: tube 1, or the base to tube 1."""
         tube, base = self.endpoints[1], self.endpoints[BASE]
         self.number += 1
-        if kind is Kind.NODE_STATE:
+        if kind is MessageKind.NODE_STATE:
             self.cycles += 1
             tube.send_state(state(self.cycles), self.now)
-        elif kind in (Kind.SURVEY_MEASUREMENT, Kind.RECEIPT):
+        elif kind in (MessageKind.SURVEY_MEASUREMENT, MessageKind.RECEIPT):
             tube.mail.submit(survey(1, tube.mail.series.take()), self.now)
-        elif kind is Kind.EVENT:
+        elif kind is MessageKind.EVENT:
             tube.mail.submit(Event(1, tube.mail.series.take(), self.now, Severity.INFO, "said"), self.now)
-        elif kind is Kind.STATIC_RECORD:
+        elif kind is MessageKind.STATIC_RECORD:
             v = (0.0, 0.0, 0.0)
             tube.mail.submit(
                 StaticRecord(1, tube.mail.series.take(), 1, 1.0, 2.0, 5, v, COV, v, COV, 20.0, False), self.now
             )
-        elif kind in (Kind.COMMAND, Kind.REPLY):
+        elif kind in (MessageKind.COMMAND, MessageKind.REPLY):
             base.mail.command(Command(1, self.number, "take_survey"), self.now)
-        elif kind in (Kind.BLOCK_SEGMENT, Kind.BLOCK_STATUS):
+        elif kind in (MessageKind.BLOCK_SEGMENT, MessageKind.BLOCK_STATUS):
             base.mail.send_segment(BlockSegment(1, self.number, 1, bytes(32), 1, 0, b"x", bytes(32)))
 
     def inject(self, end: End, frame: bytes) -> None:
@@ -141,15 +141,15 @@ class SealedString:
         self._deliver(end, frame)
         self._carry()
 
-    def end_of(self, kind: Kind) -> End:
+    def end_of(self, kind: MessageKind) -> End:
         """Where frames with messages of a kind arrive first."""
-        if kind in (Kind.AIDING, Kind.TIME_REPLY, Kind.HELLO):
+        if kind in (MessageKind.AIDING, MessageKind.TIME_REPLY, MessageKind.HELLO):
             return 1, Side.UPPER
-        if kind is Kind.TIME_REQUEST:
+        if kind is MessageKind.TIME_REQUEST:
             return 2, Side.LOWER
         return (1, Side.UPPER) if kind in DOWN else (BASE, Side.LOWER)
 
-    def frames_with(self, kind: Kind) -> list[bytes]:
+    def frames_with(self, kind: MessageKind) -> list[bytes]:
         """Frames that brought a message of a kind to where it was for."""
         return [frame for frame in self.wire[self.end_of(kind)] if kind in kinds_in(frame)]
 
@@ -183,7 +183,7 @@ class SealedString:
             self.measured += 1
             self.endpoints[ENCODER].send_aiding(aiding(self.measured, self.now), self.now)
             if self.talking:
-                self.say(Kind.NODE_STATE)
+                self.say(MessageKind.NODE_STATE)
 
     def _carry(self) -> None:
         for _ in range(60):
@@ -220,7 +220,7 @@ class SealedString:
                 endpoint.send_aiding(replace(message, offset=message.offset + 0.1, hops=message.hops + 1), self.now)
 
 
-DOWN = (Kind.RECEIPT, Kind.COMMAND, Kind.BLOCK_SEGMENT, Kind.SESSION_OFFER)
+DOWN = (MessageKind.RECEIPT, MessageKind.COMMAND, MessageKind.BLOCK_SEGMENT, MessageKind.SESSION_OFFER)
 
 
 def other_end(address: int, side: Side) -> End | None:
@@ -229,12 +229,12 @@ def other_end(address: int, side: Side) -> End | None:
     return (ORDER[place], Side(1 - side)) if 0 <= place < len(ORDER) else None
 
 
-def kinds_in(frame: bytes) -> set[Kind]:
+def kinds_in(frame: bytes) -> set[MessageKind]:
     """Kinds of the messages in a sealed frame."""
     return {kind for kind, _ in messages_in(frame)}
 
 
-def messages_in(frame: bytes) -> Iterator[tuple[Kind, bytes]]:
+def messages_in(frame: bytes) -> Iterator[tuple[MessageKind, bytes]]:
     """Kind and payload of each message in a sealed frame."""
     parsed = parse_frame(frame[HEAD.size : -TAG_SIZE]) if len(frame) > OVERHEAD else None
     for _, payload in parsed[1] if parsed else ():
@@ -257,5 +257,5 @@ def survey(tube: int, number: int) -> SurveyMeasurement:
 def state(cycles: int, tube: int = 1) -> NodeState:
     v = (0.0, 0.0, 0.0)
     return NodeState(
-        tube, 5.0, 2, Mode.TRACKING, 1.0, 1e-6, 1e-6, v, 0.0, 0.0, 1e-7, 0.5, 1e-9, NodeFlag.NONE, cycles, 0
+        tube, 5.0, 2, NodeMode.TRACKING, 1.0, 1e-6, 1e-6, v, 0.0, 0.0, 1e-7, 0.5, 1e-9, NodeFlag.NONE, cycles, 0
     )

@@ -21,7 +21,7 @@ from telemetry.keys import port_key
 from telemetry.media.credentials import Credentials, credentials_of
 from telemetry.media.zenoh_bus import Publisher, Query, ZenohBus, open_client, open_router
 from telemetry.messages import BASE, DepthReading, Side
-from telemetry.presentation.msgpack_codec import decode
+from telemetry.presentation.msgpack_codec import decode_message
 
 pytestmark = pytest.mark.slow
 RIG = "rig-1"
@@ -160,7 +160,7 @@ def test_a_source_of_the_depth_as_the_page_writes_it_is_believed(
     exec(program.replace("tls/surface:7447", endpoint).replace("/etc/borechain", str(folder)), {})
     seals = seals_of(folder, BASE, [Side.LOWER])
     assert seals is not None
-    reading = decode(seals.depth_content(arrived.get(timeout=WAIT)) or b"")
+    reading = decode_message(seals.depth_content(arrived.get(timeout=WAIT)) or b"")
     assert isinstance(reading, DepthReading)
     assert (reading.at, reading.md) == (12.5, 3.2)
 

@@ -22,9 +22,9 @@ from telemetry.media.can_exchange import (
 from telemetry.media.can_identifier import FLOW_CONTROL, PRESENCE, TUNNEL, Identifier
 from telemetry.media.port import PortFrame, Priority
 from telemetry.media.send_queue import SEND_LIMIT, SendQueue
-from telemetry.messages import Hello, Mode
+from telemetry.messages import Hello, NodeMode
 from telemetry.presentation.can_native import open_profile
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.transport.hop import HopLink
 
 STEP = 1e-3  # s, of a frame on the wire
@@ -188,7 +188,9 @@ def test_links_on_the_native_profile_lose_nothing_over_a_wire_that_does(largest:
             link = links[e.address]
             link.bundle_limit = 0
             if draw.random() < 0.02:
-                link.send_best_effort(encode(Hello(e.address, 1, 1, Mode.STILL, 1.0)), "hello", Priority.HELLO)
+                link.send_best_effort(
+                    encode_message(Hello(e.address, 1, 1, NodeMode.STILL, 1.0)), "hello", Priority.HELLO
+                )
             if draw.random() < 0.02 and (waiting := told[e.address][link.counters["told"] :]):
                 link.send_reliable(waiting[0])
                 link.counters["told"] += 1

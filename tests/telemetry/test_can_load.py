@@ -20,7 +20,7 @@ from telemetry.media.port import MAX_FRAME, PortFrame, Priority
 from telemetry.media.send_queue import SendQueue
 from telemetry.messages import Aiding, Hello, NodeState, Side, TimeReply, TimeRequest
 from telemetry.presentation.can_native import open_profile
-from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.presentation.msgpack_codec import decode_message, encode_message
 from telemetry.transport.hop import Header, pack_frame, parse_frame
 
 RATES = BitRates(125_000.0, 500_000.0)
@@ -51,7 +51,7 @@ class SimulatedJoint:
         number = self._number[end] if kept else 0
         if self.seals is not None and isinstance(message, Aiding):
             message = self.seals[end].measurement.close(message)
-        content = encode(message)  # type: ignore[arg-type]
+        content = encode_message(message)  # type: ignore[arg-type]
         if self.seals is not None and isinstance(message, NodeState):
             content = self.seals[end].close_up(content)
         self.ends[end].queue.offer(
@@ -88,7 +88,7 @@ class SimulatedJoint:
         opened = self._opened(to, payload) if payload is not None else None
         parsed = parse_frame(opened) if opened is not None else None
         for _, content in parsed[1] if parsed is not None else []:
-            self.heard[to].append((self.now, decode(content_of_sealed(bytes(content)))))
+            self.heard[to].append((self.now, decode_message(content_of_sealed(bytes(content)))))
 
 
 SIDES = (Side.LOWER, Side.UPPER)  # of the joint, of the encoder above and the tube below

@@ -37,7 +37,7 @@ from telemetry.media.media_table import open_medium
 from telemetry.media.port import PortFrame, Priority, TubeEnd
 from telemetry.messages import Aiding, Side
 from telemetry.presentation.can_dbc import IDENTIFIER_MASK
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.runtime.joint_watch import JointWatch
 from telemetry.transport.hop import HopLink
 
@@ -244,7 +244,7 @@ def test_a_log_of_a_joint_is_read_by_foreign_tools_from_the_file_alone(
     link.bundle_limit = 0
     sent = [Aiding(0.5 + k, 2e-6, 3e-7, -0.3, 1.2, 1000.0 + k, k, 3) for k in range(5)]
     for k, aiding in enumerate(sent):
-        link.send_best_effort(encode(aiding), "aiding", Priority.AIDING)
+        link.send_best_effort(encode_message(aiding), "aiding", Priority.AIDING)
         for frame in link.take_frames(float(k)):
             upper.send(frame)
         until(lambda k=k: len(arrived) > k)  # type: ignore[misc]

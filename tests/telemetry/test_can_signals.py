@@ -18,20 +18,14 @@ from telemetry.errors import DecodeError, EncodeError
 from telemetry.frozen import replace
 from telemetry.media.can_identifier import Identifier
 from telemetry.media.can_profile import NativePart
-from telemetry.messages import Aiding, Command, Hello, Mode, NodeState, TimeReply, TimeRequest
-from telemetry.presentation.can_dbc import IDENTIFIER_MASK, dbc_text, differences, identifier_of, layouts
+from telemetry.messages import Aiding, Command, Hello, NodeMode, NodeState, TimeReply, TimeRequest
+from telemetry.presentation.can_dbc import IDENTIFIER_MASK, database_differences, dbc_text, frame_layouts, identifier_of
 from telemetry.presentation.can_forms import FD_PART
 from telemetry.presentation.can_messages import NATIVE, UNSAID, NativeMessage
-from telemetry.presentation.can_native import (
-    HEADER_EVERY,
-    NativeProfile,
-    native_parts,
-    rounded,
-    rounded_frame,
-)
+from telemetry.presentation.can_native import HEADER_EVERY, NativeProfile, native_parts, rounded_frame, rounded_message
 from telemetry.presentation.can_signals import Scale
-from telemetry.presentation.msgpack_codec import encode, open_payload, values_of_opened
-from telemetry.schema import Kind
+from telemetry.presentation.msgpack_codec import encode_message, open_payload, values_of_opened
+from telemetry.schema import MessageKind
 from telemetry.transport.hop import HopLink, parse_frame
 from telemetry.unwritten import Content
 
@@ -75,39 +69,39 @@ def test_a_message_arrives_within_a_step_and_a_relay_changes_nothing(message: An
 
 @given(st.floats(1e-10, 1.0), st.floats(0.0, math.tau))
 def test_a_variance_arrives_within_its_step_and_holds_the_rounding_of_its_value(var: float, yaw: float) -> None:
-    arrived = rounded(replace(AIDING, yaw=yaw, yaw_var=var))
+    arrived = rounded_message(replace(AIDING, yaw=yaw, yaw_var=var))
     assert isinstance(arrived, Aiding)
-    step = NATIVE[Kind.AIDING].signals["yaw"].step
+    step = NATIVE[MessageKind.AIDING].signals["yaw"].step
     least, most = var * 10**-0.0251, (var + step**2 / 12.0 + (1.24e-5) ** 2 / 12.0) * 10**0.0251
     assert least <= arrived.yaw_var <= most
 
 
 def test_a_variance_of_zero_stays_zero_and_one_too_small_is_rounded_up() -> None:
-    arrived = rounded(replace(AIDING, yaw=0.0, valid_at=1000.0, yaw_var=0.0, torsion_var=1e-30))
+    arrived = rounded_message(replace(AIDING, yaw=0.0, valid_at=1000.0, yaw_var=0.0, torsion_var=1e-30))
     assert isinstance(arrived, Aiding)
     assert arrived.yaw_var == 0.0
     assert 0.0 < arrived.torsion_var < 1e-10
 
 
 def test_what_stands_on_a_step_costs_no_variance() -> None:
-    once = rounded(AIDING)
-    assert rounded(once) == once
+    once = rounded_message(AIDING)
+    assert rounded_message(once) == once
 
 
 def test_an_angle_that_rounds_to_full_scale_is_zero_again() -> None:
-    arrived = rounded(replace(AIDING, yaw=math.nextafter(math.tau, 0.0)))
+    arrived = rounded_message(replace(AIDING, yaw=math.nextafter(math.tau, 0.0)))
     assert isinstance(arrived, Aiding)
     assert arrived.yaw == 0.0
 
 
 STATE = NodeState(
-    3, 1000.0, 2, Mode.TRACKING, 1.0, 1e-6, 1e-6, (0.01, 0.0, -0.01), 1e-3, 0.01, 1e-5, math.inf, 1e-8, 0, 5, 0
+    3, 1000.0, 2, NodeMode.TRACKING, 1.0, 1e-6, 1e-6, (0.01, 0.0, -0.01), 1e-3, 0.01, 1e-5, math.inf, 1e-8, 0, 5, 0
 )  # type: ignore[arg-type]
 
 
 def test_an_age_that_is_infinite_arrives_so_and_a_long_one_stays_finite() -> None:
-    assert rounded(STATE).aiding_age == math.inf  # type: ignore[union-attr]
-    assert 1e5 < rounded(replace(STATE, aiding_age=1e9)).aiding_age < math.inf  # type: ignore[union-attr]
+    assert rounded_message(STATE).aiding_age == math.inf  # type: ignore[union-attr]
+    assert 1e5 < rounded_message(replace(STATE, aiding_age=1e9)).aiding_age < math.inf  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize(
@@ -124,7 +118,7 @@ def test_an_age_that_is_infinite_arrives_so_and_a_long_one_stays_finite() -> Non
         (replace(STATE, upper_margin=12.0), "NodeState: upper_margin: expected none where there is no radio"),
         (TimeRequest(math.inf), "TimeRequest: asked_at: expected"),
         (replace(AIDING, under_torque=-1), "Aiding: under_torque: expected"),  # type: ignore[arg-type]
-        (Hello(1, 2**40, 1, Mode.STILL, 1.0), "Hello: boot_count: expected an integer"),
+        (Hello(1, 2**40, 1, NodeMode.STILL, 1.0), "Hello: boot_count: expected an integer"),
     ],
 )
 def test_a_value_that_cannot_be_said_is_refused_by_name(message: Any, says: str) -> None:
@@ -134,7 +128,7 @@ def test_a_value_that_cannot_be_said_is_refused_by_name(message: Any, says: str)
 
 @pytest.mark.parametrize("kind", CYCLIC)
 @given(length=st.integers(0, 80))
-def test_a_frame_of_another_length_is_refused_by_name(kind: Kind, length: int) -> None:
+def test_a_frame_of_another_length_is_refused_by_name(kind: MessageKind, length: int) -> None:
     native = NATIVE[kind]
     for form in (native.fd, native.classic):
         right = [bytes(layout.length) for layout in form.layouts]
@@ -158,7 +152,7 @@ ODD = (0.0, -0.0, math.inf, -math.inf, math.nan, 1, -1, 2**60, True, None, "x", 
 @given(cyclic(), st.data(), st.booleans())
 def test_compiled_and_field_by_field_say_the_same(message: Any, data: st.DataObject, fd: bool) -> None:
     native = native_of(message)
-    values = list(values_of_opened(open_payload(encode(message))))
+    values = list(values_of_opened(open_payload(encode_message(message))))
     if data.draw(st.booleans()):
         values[data.draw(st.integers(0, len(values) - 1))] = data.draw(st.sampled_from(ODD))
     form = native.form(fd=fd)
@@ -175,7 +169,7 @@ def test_compiled_and_field_by_field_say_the_same(message: Any, data: st.DataObj
 @pytest.mark.parametrize("fd", [False, True])
 def test_what_comes_all_the_time_takes_the_compiled_way(traffic: RepeatedMessage, fd: bool) -> None:
     native = native_of(traffic.message)
-    values = list(values_of_opened(open_payload(encode(traffic.message))))
+    values = list(values_of_opened(open_payload(encode_message(traffic.message))))
     data = native.packers[fd](values, 17)
     assert data is not None
     assert native.unpackers[fd](data) is not None
@@ -183,7 +177,7 @@ def test_what_comes_all_the_time_takes_the_compiled_way(traffic: RepeatedMessage
 
 @pytest.mark.parametrize("kind", CYCLIC)
 @given(data=st.data())
-def test_any_bits_are_a_message_or_refused_by_name(kind: Kind, data: st.DataObject) -> None:
+def test_any_bits_are_a_message_or_refused_by_name(kind: MessageKind, data: st.DataObject) -> None:
     native = NATIVE[kind]
     length = native.fd.layouts[0].length
     frame = data.draw(st.binary(min_size=length, max_size=length))
@@ -207,9 +201,9 @@ def database() -> Any:
 
 
 def test_a_foreign_tool_reads_every_message_as_we_mean_it(database: Any) -> None:
-    assert differences(cantools.database.load_file(str(DBC))) == []
+    assert database_differences(cantools.database.load_file(str(DBC))) == []
     names = [message.name for message in database.messages]
-    assert names == [layout.name for _, layout, _ in layouts()]
+    assert names == [layout.name for _, layout, _ in frame_layouts()]
 
 
 @pytest.mark.parametrize(
@@ -224,7 +218,7 @@ def test_a_foreign_tool_reads_every_message_as_we_mean_it(database: Any) -> None
 def test_a_file_that_differs_is_told_by_signal(ours: str, theirs: str, says: str) -> None:
     text = dbc_text()
     assert ours in text
-    found = differences(cantools.database.load_string(text.replace(ours, theirs)))
+    found = database_differences(cantools.database.load_string(text.replace(ours, theirs)))
     assert any(line.startswith(says) for line in found), found
 
 
@@ -249,7 +243,7 @@ def linked() -> tuple[HopLink, HopLink, NativeProfile, NativeProfile]:
     profiles = NativeProfile(), NativeProfile()
     for link in (upper, lower):
         link.bundle_limit = 0
-        link.send_best_effort(encode(Hello(link._address, 1, 1, Mode.STILL, 1.0)), "hello")
+        link.send_best_effort(encode_message(Hello(link._address, 1, 1, NodeMode.STILL, 1.0)), "hello")
     carry(upper, lower, *profiles, 1.0)
     carry(lower, upper, profiles[1], profiles[0], 1.0)
     return upper, lower, *profiles
@@ -297,11 +291,11 @@ def carry(
 @pytest.mark.parametrize("fd", [True, False])
 def test_what_two_links_say_arrives_rounded_or_as_it_was(fd: bool) -> None:
     upper, lower, ours, theirs = linked()
-    order = encode(Command(1, 5, "timing", {}))
-    upper.send_best_effort(encode(AIDING), "aiding")
+    order = encode_message(Command(1, 5, "timing", {}))
+    upper.send_best_effort(encode_message(AIDING), "aiding")
     upper.send_reliable(order)
     arrived = carry(upper, lower, ours, theirs, 2.0, fd=fd)
-    assert sorted(arrived) == sorted([encode(rounded(AIDING)), order])
+    assert sorted(arrived) == sorted([encode_message(rounded_message(AIDING)), order])
     assert lower.counters["bad_frames"] == 0
     assert lower.quality == 1.0
     for _ in range(3):
@@ -314,7 +308,7 @@ def test_only_the_signals_travel_while_there_is_no_news() -> None:
     carried = []
     for k in range(24):
         now = 2.0 + k * HEADER_EVERY / 8
-        upper.send_best_effort(encode(replace(AIDING, valid_at=1000.0 + k)), "aiding")
+        upper.send_best_effort(encode_message(replace(AIDING, valid_at=1000.0 + k)), "aiding")
         (frame,) = upper.take_frames(now)
         split = ours.split(frame.payload, now, fd=True)
         assert [(type_and_part(part), len(part.data)) for part in split.parts] == [((1, FD_PART), 32)]
@@ -324,7 +318,7 @@ def test_only_the_signals_travel_while_there_is_no_news() -> None:
 
 def test_a_message_that_no_signal_can_say_takes_the_tunnel() -> None:
     upper, lower, ours, theirs = linked()
-    far = encode(replace(STATE, overruns=70_000))
+    far = encode_message(replace(STATE, overruns=70_000))
     assert native_parts(far, 1, fd=True) is None
     upper.send_best_effort(far, "state")
     assert carry(upper, lower, ours, theirs, 2.0) == [far]
@@ -336,7 +330,7 @@ def test_an_end_that_starts_anew_is_understood_after_its_first_frames() -> None:
     late.bundle_limit = 0
     got: list[bytes] = []
     for k in range(16):
-        upper.send_best_effort(encode(replace(AIDING, valid_at=1000.0 + k)), "aiding")
+        upper.send_best_effort(encode_message(replace(AIDING, valid_at=1000.0 + k)), "aiding")
         got += carry(upper, late, ours, into, 2.0 + k * HEADER_EVERY / 8)
     assert len(got) >= 8
     assert lower.peer == late.peer
@@ -344,8 +338,8 @@ def test_an_end_that_starts_anew_is_understood_after_its_first_frames() -> None:
 
 def test_parts_of_two_messages_are_not_put_together() -> None:
     profile = NativeProfile()
-    first = native_parts(encode(AIDING), 1, fd=False)
-    second = native_parts(encode(replace(AIDING, yaw=2.0)), 2, fd=False)
+    first = native_parts(encode_message(AIDING), 1, fd=False)
+    second = native_parts(encode_message(replace(AIDING, yaw=2.0)), 2, fd=False)
     assert first is not None
     assert second is not None
     profile.observe(header_of(2))
@@ -353,13 +347,13 @@ def test_parts_of_two_messages_are_not_put_together() -> None:
     (whole,) = [frame for frame in joined if frame is not None]
     parsed = parse_frame(bytes(whole))
     assert parsed is not None
-    assert parsed[1] == [[0, encode(rounded(replace(AIDING, yaw=2.0)))]]
+    assert parsed[1] == [[0, encode_message(rounded_message(replace(AIDING, yaw=2.0)))]]
 
 
 def header_of(address: int) -> bytes:
     """A frame of a link that has something to say."""
     link = HopLink(address, 1)
-    link.send_best_effort(encode(TimeRequest(1.0)), "time")
+    link.send_best_effort(encode_message(TimeRequest(1.0)), "time")
     return link.take_frames(0.0)[0].payload
 
 
@@ -378,13 +372,13 @@ def test_any_part_is_taken_or_refused_by_name(type_: int, part: int, data: bytes
 
 def test_a_bundle_is_rounded_as_its_messages_are() -> None:
     link = HopLink(2, 1)
-    link.send_best_effort(encode(AIDING), "aiding")
-    link.send_best_effort(encode(TimeReply(1.0, 2.0, 3.0, 4.0, 1.0, 1e-9)), "time")
+    link.send_best_effort(encode_message(AIDING), "aiding")
+    link.send_best_effort(encode_message(TimeReply(1.0, 2.0, 3.0, 4.0, 1.0, 1e-9)), "time")
     (frame,) = link.take_frames(0.0)
     before, after = parse_frame(frame.payload), parse_frame(rounded_frame(frame.payload))
     assert before is not None
     assert after is not None
     assert before[0] == after[0]
-    assert after[1][0] == [0, encode(rounded(AIDING))]
+    assert after[1][0] == [0, encode_message(rounded_message(AIDING))]
     assert rounded_frame(b"garbage") == b"garbage"
-    assert set(Aiding.__struct_fields__) - set(UNSAID) == set(NATIVE[Kind.AIDING].signals)
+    assert set(Aiding.__struct_fields__) - set(UNSAID) == set(NATIVE[MessageKind.AIDING].signals)

@@ -13,7 +13,7 @@ from telemetry.media.can_exchange import CanExchange
 from telemetry.media.can_frame import EXTENDED, IDENTIFIER, CanFrame
 from telemetry.media.port import MAX_FRAME
 from telemetry.media.send_queue import SEND_LIMIT, SendQueue
-from telemetry.messages import BASE, ENCODER, Aiding, Event, Message, Mode, NodeFlag, NodeState, Severity, Side
+from telemetry.messages import BASE, ENCODER, Aiding, Event, Message, NodeFlag, NodeMode, NodeState, Severity, Side
 from telemetry.presentation.can_native import open_profile
 
 TUBES = (3, 2, 1)  # from the top
@@ -79,7 +79,8 @@ class String:
             point = self.points[tube]
             point.send_state(
                 NodeState(
-                    tube, self.now, point.place.hops, Mode.TRACKING, 1.0, 1e-6, 1e-6, ZERO, 0.0, 0.0, 1e-7, 0.5, 1e-9,
+                    tube, self.now, point.place.hops, NodeMode.TRACKING, 1.0, 1e-6, 1e-6, ZERO, 0.0, 0.0, 1e-7, 0.5,
+                    1e-9,
                     NodeFlag.NONE, number, 0,
                 ),
                 self.now,

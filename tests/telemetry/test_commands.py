@@ -19,7 +19,7 @@ from telemetry.application.arguments import (
 from telemetry.application.commands import COMMANDS, CommandSpec, ObeyedBy, find_command
 from telemetry.errors import CommandError
 from telemetry.messages import Command, Reply
-from telemetry.presentation.msgpack_codec import MAX_PAYLOAD, decode, encode
+from telemetry.presentation.msgpack_codec import MAX_PAYLOAD, decode_message, encode_message
 from telemetry.quantities import MAX_TEXT, Quantity, ValueKind
 
 ATTITUDE = find_command("recalibrate", "attitude")
@@ -56,7 +56,7 @@ def test_whatever_the_table_allows_is_read_checked_and_sent(spec: CommandSpec, d
     assert {name: obeyed[name] for name in arguments} == arguments
     if spec.by is ObeyedBy.TUBE:
         command = Command(1, 1, spec.name, arguments)
-        assert decode(encode(command)) == command
+        assert decode_message(encode_message(command)) == command
 
 
 def test_defaults_are_allowed_values() -> None:
@@ -123,6 +123,6 @@ def test_values_are_shown_with_their_unit_and_what_is_not_promised_is_left_out()
 def test_the_longest_reply_fits_one_payload() -> None:
     timing = find_command("timing")
     values = {quantity.name: 99.123456789 for quantity in timing.reply} | {"cycles": 2**53, "overruns": 2**53}
-    assert len(encode(Reply(250, 2**53, True, "", values))) < MAX_PAYLOAD // 4
+    assert len(encode_message(Reply(250, 2**53, True, "", values))) < MAX_PAYLOAD // 4
     angles = dict.fromkeys(("pitch", "pitch_std", "roll", "roll_std"), (1.0,) * 16)
-    assert len(encode(Reply(250, 2**53, True, "", {"method": "circle"} | angles))) < MAX_PAYLOAD // 4
+    assert len(encode_message(Reply(250, 2**53, True, "", {"method": "circle"} | angles))) < MAX_PAYLOAD // 4

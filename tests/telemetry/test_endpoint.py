@@ -30,7 +30,7 @@ from telemetry.messages import (
     Side,
     SurveyMeasurement,
 )
-from telemetry.presentation.msgpack_codec import Kind, encode, open_payload
+from telemetry.presentation.msgpack_codec import MessageKind, encode_message, open_payload
 from telemetry.transport.hop import pack_frame, parse_frame
 
 TICK = 1.0 / 1.9
@@ -346,7 +346,9 @@ def test_what_is_no_warning_goes_up_with_the_next_states(
 
     def counting(frame: PortFrame) -> bool:
         _, entries = parse_frame(frame.payload) or (None, [])
-        with_events.extend([frame] if any(open_payload(entry).kind is Kind.EVENT for _, entry in entries) else [])
+        with_events.extend(
+            [frame] if any(open_payload(entry).kind is MessageKind.EVENT for _, entry in entries) else []
+        )
         return put(frame)
 
     monkeypatch.setattr(to_the_base, "send", counting)
@@ -390,11 +392,11 @@ def test_any_bytes_on_any_port_are_counted_and_dropped(frame: bytes, side: Side)
 
 
 def test_every_kind_of_message_has_a_priority() -> None:
-    assert set(PRIORITIES) == set(Kind)
+    assert set(PRIORITIES) == set(MessageKind)
 
 
 def test_a_state_that_is_damaged_behind_its_tube_is_refused_where_it_is_read() -> None:
-    damaged = encode(state(1, 7))[:-5]
+    damaged = encode_message(state(1, 7))[:-5]
     relay = Endpoint(3, frozenset({Side.UPPER, Side.LOWER}), boot_count=1)
     base = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
     assert relay.receive(Side.LOWER, pack_frame((4, 1 << 24 | 4, 1, 0, 0, 0), [(0, damaged)]), 10.0) == []
@@ -405,7 +407,7 @@ def test_a_state_that_is_damaged_behind_its_tube_is_refused_where_it_is_read() -
 
 def test_the_states_of_a_long_string_go_up_in_one_frame() -> None:
     relay = Endpoint(160, frozenset({Side.UPPER, Side.LOWER}), boot_count=1)
-    entries = [(0, encode(state(1, tube))) for tube in range(1, 160)]
+    entries = [(0, encode_message(state(1, tube))) for tube in range(1, 160)]
     relay.receive(Side.LOWER, pack_frame((159, 1 << 24 | 159, 1, 0, 0, 0), []), 10.0)
     relay.send_state(state(1, 160), 10.0)
     relay.receive(Side.LOWER, pack_frame((159, 1 << 24 | 159, 2, 0, 0, 0), entries), 10.1)

@@ -16,11 +16,18 @@ import pytest
 from sealed_string import ORDER, SealedString, make_folder
 
 from telemetry.messages import BASE, ENCODER, Side
-from telemetry.schema import Kind
+from telemetry.schema import MessageKind
 from telemetry.transport.hop import MAX_FRAME, QUEUE_LIMIT, WINDOW
 
 Mutate = Callable[[random.Random, bytes, list[bytes]], bytes]
-SAID = (Kind.SURVEY_MEASUREMENT, Kind.COMMAND, Kind.EVENT, Kind.BLOCK_SEGMENT, Kind.NODE_STATE, Kind.STATIC_RECORD)
+SAID = (
+    MessageKind.SURVEY_MEASUREMENT,
+    MessageKind.COMMAND,
+    MessageKind.EVENT,
+    MessageKind.BLOCK_SEGMENT,
+    MessageKind.NODE_STATE,
+    MessageKind.STATIC_RECORD,
+)
 ODD = (
     None,
     True,
@@ -155,7 +162,7 @@ def works_still(string: SealedString) -> None:
     string.talking = True
     string.run(30.0)
     assert string.endpoints[1].mail.outbox_size == 0
-    string.say(Kind.SURVEY_MEASUREMENT)
+    string.say(MessageKind.SURVEY_MEASUREMENT)
     assert string.endpoints[1].mail.outbox_size == 1
     string.run(15.0)
     assert string.endpoints[1].mail.outbox_size == 0  # it was stored, and the receipt came back

@@ -16,9 +16,15 @@ from telemetry.errors import DecodeError, EncodeError
 from telemetry.frozen import replace
 from telemetry.messages import BASE, Aiding, DepthReading, NodeState, Reply, SessionOffer, Stand
 from telemetry.presentation.message_codec import CODECS
-from telemetry.presentation.msgpack_codec import DOWNWARD, decode, encode, open_payload, values_of_opened
+from telemetry.presentation.msgpack_codec import (
+    DOWNWARD,
+    decode_message,
+    encode_message,
+    open_payload,
+    values_of_opened,
+)
 from telemetry.presentation.wire_structs import number_type
-from telemetry.schema import SCHEMA, SPEC_OF, Field, MessageSpec
+from telemetry.schema import SCHEMA, SPEC_OF, MessageField, MessageSpec
 
 EDGES = [math.nan, math.inf, -math.inf, -0.0, 1e300, 2**63, -1, 0, 1, 2.0, True, None, "text", b"", b"12345678", [], {}]
 VECTORS = [
@@ -68,7 +74,7 @@ def checked_by_hand(message: Any) -> Any:
     return type(message)(*[f.check(getattr(message, f.name)) for f in fields])
 
 
-def odd_values(field: Field) -> list[Any]:
+def odd_values(field: MessageField) -> list[Any]:
     """What stands at and beyond the ends of a field's range, and what is of another kind."""
     bounds = [field.low, field.high, math.nextafter(field.low, -math.inf), math.nextafter(field.high, math.inf)]
     whole = [int(bound) + step for bound in bounds if math.isfinite(bound) for step in (-1, 0, 1)]
@@ -173,31 +179,33 @@ def test_numbers_of_numpy_are_written_as_any_other() -> None:
     state = next(message for message in MADE if isinstance(message, NodeState))
     bias = np.array(state.gyro_bias)
     given_ = replace(state, yaw=np.float64(state.yaw), gyro_bias=tuple(bias), flags=int(state.flags))
-    assert encode(given_) == encode(state)
+    assert encode_message(given_) == encode_message(state)
     reply = Reply(1, 2, True, "", {"a": 1.5, "b": (1.0, 2.0)})
-    assert encode(replace(reply, values={"a": np.float64(1.5), "b": list(np.array([1.0, 2.0]))})) == encode(reply)
+    assert encode_message(
+        replace(reply, values={"a": np.float64(1.5), "b": list(np.array([1.0, 2.0]))})
+    ) == encode_message(reply)
 
 
 def test_text_is_no_bytes() -> None:
     with pytest.raises(EncodeError, match=r"^Aiding: seal: "):
-        encode(Aiding(1.0, 1e-8, 0.0, 0.0, 0.0, 1.0, 1, 0, seal="AAAA"))  # type: ignore[arg-type]
+        encode_message(Aiding(1.0, 1e-8, 0.0, 0.0, 0.0, 1.0, 1, 0, seal="AAAA"))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("head", [b"\xdd\xff\xff\xff\xff", b"\xdf\xff\xff\xff\xff", b"\xdb\xff\xff\xff\xff"])
 @pytest.mark.parametrize("spec", SCHEMA, ids=lambda spec: spec.message.__name__)
 def test_a_length_of_four_billions_is_refused_before_there_is_room_for_it(spec: MessageSpec, head: bytes) -> None:
-    whole = encode(ONE_OF[spec.message])
+    whole = encode_message(ONE_OF[spec.message])
     fields = msgpack.unpackb(whole)["b"]
     for key in (*fields, "unknown"):
         body = fields | {key: 0}
         said = [msgpack.packb(k) + (head if k == key else msgpack.packb(value)) for k, value in body.items()]
         with pytest.raises(DecodeError):
-            decode(whole[: whole.index(b"\xa1b") + 2] + b"\xde" + len(said).to_bytes(2) + b"".join(said))
+            decode_message(whole[: whole.index(b"\xa1b") + 2] + b"\xde" + len(said).to_bytes(2) + b"".join(said))
 
 
 @pytest.mark.parametrize("message", ONE_OF.values(), ids=lambda message: type(message).__name__)
 def test_a_message_that_was_read_is_as_frozen_as_one_that_was_made(message: Any) -> None:
-    read_ = decode(encode(message))
+    read_ = decode_message(encode_message(message))
     assert type(read_) is type(message)
     assert read_ == message
     assert pickle.loads(pickle.dumps(read_)) == message == replace(read_)
@@ -218,12 +226,12 @@ def test_a_written_payload_is_that_of_a_map_in_the_earliest_version(message: Any
     rows = {
         "v": version, "k": int(spec.kind), "o": origin, "t": target, "s": getattr(message, "sequence", 0), "b": body
     }  # fmt: skip
-    assert encode(message) == msgpack.packb(rows)
+    assert encode_message(message) == msgpack.packb(rows)
 
 
 @pytest.mark.parametrize("message", ONE_OF.values(), ids=lambda message: type(message).__name__)
 def test_the_values_of_a_payload_are_those_of_all_fields(message: Any) -> None:
-    opened = open_payload(encode(message))
+    opened = open_payload(encode_message(message))
     values = values_of_opened(opened)
     assert CODECS[type(message)].message_of(values) == message
     assert len(values) == len(message.__struct_fields__)

@@ -28,20 +28,27 @@ from telemetry.messages import (
     TimeRequest,
     UploadPhase,
 )
-from telemetry.presentation.msgpack_codec import MAX_PAYLOAD, decode, encode, open_payload, state_origin, unwritten
-from telemetry.schema import SCHEMA, Kind
+from telemetry.presentation.msgpack_codec import (
+    MAX_PAYLOAD,
+    decode_message,
+    encode_message,
+    open_payload,
+    state_origin,
+    unwritten_message,
+)
+from telemetry.schema import SCHEMA, MessageKind
 from telemetry.transport.hop import BUNDLE_LIMIT, ENTRY_BYTES, MAX_FRAME
 
 ANY = st.one_of(*MESSAGES.values())
-OF_BEFORE = set(Kind) - {
-    Kind.DEPTH_READING,
-    Kind.SESSION_OFFER,
+OF_BEFORE = set(MessageKind) - {
+    MessageKind.DEPTH_READING,
+    MessageKind.SESSION_OFFER,
 }  # kinds that there were when the payloads were recorded
 GOLDEN = json.loads((Path(__file__).parent / "golden" / "payloads.json").read_text())
 
 
 def test_the_schema_names_every_field_of_every_message_once() -> None:
-    assert [spec.kind for spec in SCHEMA] == list(Kind)
+    assert [spec.kind for spec in SCHEMA] == list(MessageKind)
     for spec in SCHEMA:
         assert [field.name for field in spec.fields] == list(spec.message.__struct_fields__)
         assert len({field.key for field in spec.fields}) == len(spec.fields)
@@ -49,36 +56,36 @@ def test_the_schema_names_every_field_of_every_message_once() -> None:
 
 
 def test_payloads_of_before_the_schema_are_written_as_they_were() -> None:
-    assert [encode(message).hex() for message in MADE] == GOLDEN["made"]
-    assert {Kind(msgpack.unpackb(bytes.fromhex(payload))["k"]) for payload in GOLDEN["made"]} == OF_BEFORE
+    assert [encode_message(message).hex() for message in MADE] == GOLDEN["made"]
+    assert {MessageKind(msgpack.unpackb(bytes.fromhex(payload))["k"]) for payload in GOLDEN["made"]} == OF_BEFORE
 
 
 @pytest.mark.parametrize("payload", GOLDEN["made"] + GOLDEN["recorded"])
 def test_a_payload_of_before_the_schema_is_read_and_written_bit_for_bit(payload: str) -> None:
-    assert encode(decode(bytes.fromhex(payload))).hex() == payload
+    assert encode_message(decode_message(bytes.fromhex(payload))).hex() == payload
 
 
 @given(messages(Reply))
 def test_a_reply_without_values_is_said_as_before_there_were_any(reply: Reply) -> None:
-    rows = msgpack.unpackb(encode(reply))
+    rows = msgpack.unpackb(encode_message(reply))
     assert (rows["v"], "w" in rows["b"]) == ((3, True) if reply.values else (1, False))
 
 
 def test_replies_of_earlier_versions_share_no_values() -> None:
-    payload = encode(Reply(1, 2, True, ""))
-    decode(payload).values["a"] = 1  # type: ignore[union-attr]
-    assert decode(payload) == Reply(1, 2, True, "")
+    payload = encode_message(Reply(1, 2, True, ""))
+    decode_message(payload).values["a"] = 1  # type: ignore[union-attr]
+    assert decode_message(payload) == Reply(1, 2, True, "")
 
 
 @pytest.mark.slow
 @given(ANY)
 def test_decoding_gives_back_what_was_encoded(message: Any) -> None:
-    assert decode(encode(message)) == message
+    assert decode_message(encode_message(message)) == message
 
 
 @given(ANY)
 def test_the_envelope_tells_the_route_without_the_body(message: Any) -> None:
-    envelope = open_payload(encode(message))
+    envelope = open_payload(encode_message(message))
     if isinstance(message, Receipt | Command | BlockSegment | SessionOffer):
         assert envelope.target == message.tube
     else:
@@ -89,12 +96,12 @@ def test_the_envelope_tells_the_route_without_the_body(message: Any) -> None:
 @given(ANY)
 def test_a_state_is_known_by_its_first_bytes(message: Any) -> None:
     tube = message.tube if isinstance(message, NodeState) else None
-    assert state_origin(encode(message)) == state_origin(unwritten(message)) == tube
+    assert state_origin(encode_message(message)) == state_origin(unwritten_message(message)) == tube
 
 
 @given(MESSAGES[NodeState], st.data())
 def test_what_looks_like_a_state_is_one_of_that_tube_or_refused(state: NodeState, data: st.DataObject) -> None:
-    payload = bytearray(encode(state))
+    payload = bytearray(encode_message(state))
     payload[data.draw(st.integers(0, 15))] = data.draw(st.integers(0, 255))
     del payload[data.draw(st.just(len(payload)) | st.integers(0, len(payload))) :]
     found = state_origin(bytes(payload))
@@ -103,7 +110,7 @@ def test_what_looks_like_a_state_is_one_of_that_tube_or_refused(state: NodeState
     except DecodeError:
         return
     rows = msgpack.unpackb(bytes(payload), strict_map_key=False)
-    is_as_written = opened.kind is Kind.NODE_STATE and list(rows)[:3] == ["v", "k", "o"]
+    is_as_written = opened.kind is MessageKind.NODE_STATE and list(rows)[:3] == ["v", "k", "o"]
     assert found == (opened.origin if is_as_written else None)
 
 
@@ -111,7 +118,7 @@ def test_what_looks_like_a_state_is_one_of_that_tube_or_refused(state: NodeState
 def test_aiding_is_said_in_the_earliest_version_that_can(aiding: Aiding) -> None:
     aiding = replace(aiding, epoch=0, seal=b"")
     twisted = bool(aiding.torque or aiding.torsion_var or aiding.under_torque)
-    rows = msgpack.unpackb(encode(aiding))
+    rows = msgpack.unpackb(encode_message(aiding))
     assert rows["v"] == (2 if twisted else 1)
     assert ({"q", "tv", "u"} <= set(rows["b"])) == twisted
 
@@ -119,9 +126,9 @@ def test_aiding_is_said_in_the_earliest_version_that_can(aiding: Aiding) -> None
 @given(MESSAGES[Aiding])
 def test_aiding_of_an_old_node_is_read_as_that_of_a_rigid_string(aiding: Aiding) -> None:
     rigid = replace(aiding, torque=0.0, torsion_var=0.0, under_torque=False, epoch=0, seal=b"")
-    rows = msgpack.unpackb(encode(rigid))
+    rows = msgpack.unpackb(encode_message(rigid))
     rows["b"] |= {"q": 5.0, "tv": 1.0, "u": True}  # keys that version 1 does not know
-    assert decode(msgpack.packb(rows)) == rigid
+    assert decode_message(msgpack.packb(rows)) == rigid
 
 
 @given(MESSAGES[NodeState])
@@ -130,11 +137,11 @@ def test_a_state_is_said_as_before_there_was_what_it_does_not_use(state: NodeSta
     state = replace(state, epoch=0, numbered=0)
     aligned = state.alignment != (0.0, 0.0, 0.0)
     by_radio = min(state.upper_margin, state.lower_margin) < math.inf
-    rows = msgpack.unpackb(encode(state))
+    rows = msgpack.unpackb(encode_message(state))
     assert rows["v"] == (4 if by_radio else 2 if aligned else 1)
     assert ("al" in rows["b"]) == (aligned or by_radio)
     assert ({"um", "lm"} <= set(rows["b"])) == by_radio
-    assert decode(msgpack.packb(rows)) == state
+    assert decode_message(msgpack.packb(rows)) == state
 
 
 @pytest.mark.parametrize(
@@ -148,22 +155,22 @@ def test_a_state_is_said_as_before_there_was_what_it_does_not_use(state: NodeSta
     ],
 )
 def test_a_version_that_is_not_known_or_lacks_its_fields_is_refused(message: Any, version: int, named: str) -> None:
-    rows = msgpack.unpackb(encode(message)) | {"v": version}
+    rows = msgpack.unpackb(encode_message(message)) | {"v": version}
     with pytest.raises(DecodeError, match=named):
-        decode(msgpack.packb(rows))
+        decode_message(msgpack.packb(rows))
 
 
 @given(st.binary(max_size=300))
 def test_random_bytes_are_refused_by_name(payload: bytes) -> None:
     with pytest.raises(DecodeError):
-        decode(payload)
+        decode_message(payload)
 
 
 @given(ANY, st.data())
 def test_truncated_payloads_are_refused(message: Any, data: st.DataObject) -> None:
-    payload = encode(message)
+    payload = encode_message(message)
     with pytest.raises(DecodeError):
-        decode(payload[: data.draw(st.integers(0, len(payload) - 1))])
+        decode_message(payload[: data.draw(st.integers(0, len(payload) - 1))])
 
 
 WRONG = st.one_of(
@@ -186,14 +193,14 @@ WRONG = st.one_of(
 @pytest.mark.slow
 @given(ANY, st.data())
 def test_a_wrong_value_in_the_right_shape_is_refused_or_within_range(message: Any, data: st.DataObject) -> None:
-    rows = msgpack.unpackb(encode(message))
+    rows = msgpack.unpackb(encode_message(message))
     key = data.draw(st.sampled_from(sorted(rows["b"])))
     rows["b"][key] = data.draw(WRONG)
     try:
-        decoded = decode(msgpack.packb(rows))
+        decoded = decode_message(msgpack.packb(rows))
     except DecodeError:
         return
-    assert decode(encode(decoded)) == decoded  # what is accepted is a message like any other
+    assert decode_message(encode_message(decoded)) == decoded  # what is accepted is a message like any other
 
 
 @pytest.mark.parametrize(
@@ -213,9 +220,9 @@ def test_a_wrong_value_in_the_right_shape_is_refused_or_within_range(message: An
     ],
 )
 def test_a_wrong_envelope_is_refused_by_name(change: dict[str, Any], named: str) -> None:
-    rows = msgpack.unpackb(encode(Receipt(3, 4))) | change
+    rows = msgpack.unpackb(encode_message(Receipt(3, 4))) | change
     with pytest.raises(DecodeError, match=f"^{re.escape(named)}"):
-        decode(msgpack.packb(rows))
+        decode_message(msgpack.packb(rows))
 
 
 @pytest.mark.parametrize(
@@ -234,10 +241,10 @@ def test_a_wrong_envelope_is_refused_by_name(change: dict[str, Any], named: str)
 )
 def test_a_message_out_of_range_is_not_sent(message: Any) -> None:
     with pytest.raises(EncodeError):
-        encode(message)
+        encode_message(message)
 
 
 def test_a_segment_fits_one_payload_and_a_frame_holds_a_bundle() -> None:
     worst = BlockSegment(250, 2**53, 2**32 - 1, bytes(32), 32, 31, b"x" * SEGMENT_SIZE, bytes(32))
-    assert len(encode(worst)) <= MAX_PAYLOAD
+    assert len(encode_message(worst)) <= MAX_PAYLOAD
     assert MAX_PAYLOAD + ENTRY_BYTES <= BUNDLE_LIMIT <= MAX_FRAME - 128

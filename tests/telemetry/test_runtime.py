@@ -29,7 +29,7 @@ from telemetry.media.port import Port, PortFrame, Priority, TubeEnd
 from telemetry.media.zenoh_bus import JSON, Query, ZenohBus, open_client, open_router
 from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import ENCODER, Message, Side, TimeReply, TimeRequest
-from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.presentation.msgpack_codec import decode_message, encode_message
 from telemetry.runtime import step_client
 from telemetry.runtime.hosting import Place
 from telemetry.runtime.inbox import INBOX_LIMIT, Inbox
@@ -351,7 +351,7 @@ class TestOwnClock:
             await until(lambda: loop.losses()["ports"]["lower"]["is_up"])
             while set(process.threads) <= {threading.get_ident()}:  # until no cycle was due just then
                 asking = HopLink(1, 1)
-                asking.send_best_effort(encode(TimeRequest(1.0)), "time", Priority.TIME)
+                asking.send_best_effort(encode_message(TimeRequest(1.0)), "time", Priority.TIME)
                 (frame,) = asking.take_frames(1.0)
                 answers.clear()
                 await asyncio.to_thread(sender.send, frame)
@@ -413,7 +413,7 @@ def messages_of(frame: bytes) -> list[Message]:
     """What a frame of the link says."""
     parsed = parse_frame(frame)
     assert parsed is not None
-    return [decode(payload) for _, payload in parsed[1]]
+    return [decode_message(payload) for _, payload in parsed[1]]
 
 
 async def until(probe: Callable[[], bool]) -> None:

@@ -21,8 +21,8 @@ from telemetry.application.seals import Keys, Seals
 from telemetry.frozen import replace
 from telemetry.media.credentials import DEPTH_SOURCE
 from telemetry.messages import BASE, ENCODER, DepthReading, Event, Severity, Side
-from telemetry.presentation.msgpack_codec import encode
-from telemetry.schema import Kind
+from telemetry.presentation.msgpack_codec import encode_message
+from telemetry.schema import MessageKind
 from telemetry.transport.hop import MAX_FRAME
 from telemetry.transport.joint_seal import HEAD, JointSeal
 from telemetry.transport.key_ring import Generation, KeyRing, key_file, read_ring
@@ -45,7 +45,7 @@ def page_rows(name: str) -> dict[str, list[str]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ON_A_JOINT, ids=name_of)
-def test_no_attack_on_a_joint_has_an_effect_and_each_is_counted(folder: Path, kind: Kind) -> None:
+def test_no_attack_on_a_joint_has_an_effect_and_each_is_counted(folder: Path, kind: MessageKind) -> None:
     found = outcomes(folder, kind, JOINT_ATTACKS)
     assert not any(outcome.had_effect for outcome in found.values()), found
     assert all(outcome.counted or not outcome.tried for outcome in found.values()), found
@@ -54,7 +54,7 @@ def test_no_attack_on_a_joint_has_an_effect_and_each_is_counted(folder: Path, ki
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", END_TO_END, ids=name_of)
-def test_no_attack_of_a_stolen_relay_has_an_effect(folder: Path, kind: Kind) -> None:
+def test_no_attack_of_a_stolen_relay_has_an_effect(folder: Path, kind: MessageKind) -> None:
     found = outcomes(folder, kind, END_ATTACKS)
     assert not any(outcome.had_effect for outcome in found.values()), found
     silent = {name for name, outcome in found.items() if not outcome.counted}
@@ -67,7 +67,7 @@ def test_the_page_shows_every_kind_and_every_attack() -> None:
     assert page_rows("joint")["message"] == list(JOINT_ATTACKS)
     assert list(page_rows("between")) == ["message", "---", *map(name_of, END_TO_END)]
     assert page_rows("between")["message"] == list(END_ATTACKS)
-    assert set(ON_A_JOINT) == set(Kind) - {Kind.DEPTH_READING}  # on no joint; tested below
+    assert set(ON_A_JOINT) == set(MessageKind) - {MessageKind.DEPTH_READING}  # on no joint; tested below
 
 
 def test_what_is_honest_arrives_under_seals_and_nothing_is_counted(folder: Path) -> None:
@@ -90,7 +90,7 @@ def test_restarts_of_everybody_cost_no_survey_and_count_as_no_attack(folder: Pat
     string.settle()
     string.talking = True
     for address in (BASE, 2, ENCODER, 1, BASE):
-        string.say(Kind.SURVEY_MEASUREMENT)
+        string.say(MessageKind.SURVEY_MEASUREMENT)
         string.start(address)
         string.run(20.0)
     assert string.endpoints[1].mail.outbox_size == 0
@@ -99,10 +99,10 @@ def test_restarts_of_everybody_cost_no_survey_and_count_as_no_attack(folder: Pat
 
 def test_orders_that_wait_for_a_session_are_obeyed_once(folder: Path) -> None:
     string = SealedString(folder)
-    string.say(Kind.COMMAND)
+    string.say(MessageKind.COMMAND)
     string.settle()
     string.start(1)
-    string.say(Kind.COMMAND)
+    string.say(MessageKind.COMMAND)
     string.settle()
     assert [type(m).__name__ for m in string.heard[1]].count("Command") == 2
     assert [type(m).__name__ for m in string.heard[BASE]].count("Reply") == 2
@@ -112,10 +112,10 @@ def test_orders_that_wait_for_a_session_are_obeyed_once(folder: Path) -> None:
 def test_each_byte_of_a_tag_counts(folder: Path, byte: int) -> None:
     string = SealedString(folder)
     string.settle()
-    string.say(Kind.NODE_STATE)
+    string.say(MessageKind.NODE_STATE)
     string.run(1.0)
-    (frame,) = string.frames_with(Kind.NODE_STATE)[-1:]
-    (payload,) = [p for kind, p in messages_in(frame) if kind is Kind.NODE_STATE]
+    (frame,) = string.frames_with(MessageKind.NODE_STATE)[-1:]
+    (payload,) = [p for kind, p in messages_in(frame) if kind is MessageKind.NODE_STATE]
     base = string.seals(BASE)
     for bit in range(8):
         for place, judge in (
@@ -133,12 +133,14 @@ def forgeries(folder: Path, count: int) -> int:
     """Random tags on a frame, a payload, a measurement and a depth; how many of ``count`` each were believed."""
     string = SealedString(folder)
     string.settle()
-    string.say(Kind.SURVEY_MEASUREMENT)
+    string.say(MessageKind.SURVEY_MEASUREMENT)
     string.run(ARRIVED)
     base, tube = string.seals(BASE), string.seals(1)
-    frame = string.frames_with(Kind.SURVEY_MEASUREMENT)[-1]
-    (payload,) = [p for kind, p in messages_in(frame) if kind is Kind.SURVEY_MEASUREMENT]
-    reading = seal_depth(read_ring(key_file(folder, DEPTH_SOURCE), DEPTH_SOURCE), encode(DepthReading(9, 1.0, 2.0, ())))
+    frame = string.frames_with(MessageKind.SURVEY_MEASUREMENT)[-1]
+    (payload,) = [p for kind, p in messages_in(frame) if kind is MessageKind.SURVEY_MEASUREMENT]
+    reading = seal_depth(
+        read_ring(key_file(folder, DEPTH_SOURCE), DEPTH_SOURCE), encode_message(DepthReading(9, 1.0, 2.0, ()))
+    )
     measured = aiding(10**6, string.now)
     believed = 0
     for number in range(count):
@@ -209,7 +211,7 @@ def test_a_stolen_tube_speaks_for_no_other(folder: Path) -> None:
         joint = string.seals(victim).joints[side]
         assert joint.open(thief.frame_as(named, victim, joint._session) or b"", string.now) is None
         assert joint.counters["seal_wrong_tag"] == 1
-    content = encode(survey(1, 99))
+    content = encode_message(survey(1, 99))
     under_own_name = string.seals(2).close_up(content)
     (believed,) = {string.seals(BASE).hear(under_own_name, 1, string.now).is_believed}
     assert not believed
@@ -231,7 +233,7 @@ def test_a_revoked_tube_is_believed_nothing(tmp_path: Path) -> None:
     assert not key_file(folder, 2).parent.joinpath("tube-2.keys").exists()
     string.run(3.0)  # the others read their new files
     string.endpoints[2].seals = Seals(old, 2, Side)  # it starts anew with its old ones
-    string.say(Kind.NODE_STATE)
+    string.say(MessageKind.NODE_STATE)
     string.endpoints[2].mail.submit(survey(2, 50), string.now)
     string.run(10.0)
     assert len(string.heard[BASE]) == heard
@@ -253,8 +255,8 @@ def test_keys_rotated_on_a_string_that_works_cost_no_message(tmp_path: Path) -> 
     for tube, text in ((1, before[0]), (2, before[1])):
         key_file(folder, tube).write_text(text)
     for number in range(4):
-        string.say(Kind.SURVEY_MEASUREMENT)
-        string.say(Kind.COMMAND)
+        string.say(MessageKind.SURVEY_MEASUREMENT)
+        string.say(MessageKind.COMMAND)
         string.run(4.0)
         if number == 1:
             key_file(folder, 2).write_text(after)
@@ -283,7 +285,7 @@ def test_a_measurement_that_is_forged_or_old_is_refused(folder: Path) -> None:
 
 def test_a_depth_is_believed_under_its_own_key_alone(folder: Path) -> None:
     base = SealedString(folder).seals(BASE)
-    payload = encode(DepthReading(3, 1.0, 2.0, ()))
+    payload = encode_message(DepthReading(3, 1.0, 2.0, ()))
     source = read_ring(key_file(folder, DEPTH_SOURCE), DEPTH_SOURCE)
     sealed = seal_depth(source, payload)
     assert base.depth_content(sealed) == payload

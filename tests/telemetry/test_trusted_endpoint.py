@@ -18,14 +18,14 @@ from telemetry.messages import (
     Command,
     Event,
     Hello,
-    Mode,
+    NodeMode,
     Receipt,
     Reply,
     Severity,
     Side,
 )
 from telemetry.presentation.content import content_of_message
-from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.presentation.msgpack_codec import decode_message, encode_message
 from telemetry.transport.hop import HopLink
 
 EVENT = Event(3, 1, 5.0, Severity.ERROR, "stopped")
@@ -45,7 +45,7 @@ class Neighbour:
                 self.link.send_reliable(payload)
             else:
                 self.link.send_best_effort(payload, k)
-        self.link.send_best_effort(encode(Hello(ENCODER, 1, 0, Mode.BOOT, 1.0)), "hello")
+        self.link.send_best_effort(encode_message(Hello(ENCODER, 1, 0, NodeMode.BOOT, 1.0)), "hello")
         for frame in self.link.take_frames(self.now):
             self.tube.receive(Side.UPPER, frame.payload, self.now)
 
@@ -55,7 +55,7 @@ class Neighbour:
         said: list[object] = []
         for side, frame in self.tube.take_frames(self.now):
             if side is Side.UPPER:
-                said += [decode(payload) for payload in self.link.receive(frame.payload, self.now)]
+                said += [decode_message(payload) for payload in self.link.receive(frame.payload, self.now)]
         return said
 
 
@@ -67,10 +67,10 @@ def tube() -> Endpoint:
 def test_a_receipt_for_other_content_empties_no_outbox(tube: Endpoint) -> None:
     above = Neighbour(tube)
     tube.mail.submit(EVENT, above.now)
-    above.say(encode(Receipt(3, 1)), encode(Receipt(3, 1, bytes(16))))
+    above.say(encode_message(Receipt(3, 1)), encode_message(Receipt(3, 1, bytes(16))))
     assert tube.mail.outbox_size == 1
     assert tube.counters["foreign_receipts"] == 2
-    above.say(encode(Receipt(3, 1, content_of_message(EVENT))))
+    above.say(encode_message(Receipt(3, 1, content_of_message(EVENT))))
     assert tube.mail.outbox_size == 0
 
 
@@ -78,7 +78,7 @@ def test_a_receipt_for_other_content_empties_no_outbox(tube: Endpoint) -> None:
 def test_whatever_hop_count_a_neighbour_names_the_endpoint_speaks_on(hops: int) -> None:
     tube = Endpoint(3, frozenset(Side), boot_count=1)
     above = Neighbour(tube)
-    above.say(encode(Hello(ENCODER, 1, hops, Mode.BOOT, 1.0)), reliable=False)
+    above.say(encode_message(Hello(ENCODER, 1, hops, NodeMode.BOOT, 1.0)), reliable=False)
     above.listen()
     assert tube.place.hops <= MAX_TUBE
     restored = Endpoint(3, frozenset(Side), boot_count=2, restored=tube.export_state())
@@ -150,21 +150,21 @@ def test_a_depth_on_a_joint_is_no_message(tube: Endpoint) -> None:
     from telemetry.messages import DepthReading
 
     above = Neighbour(tube)
-    above.say(encode(DepthReading(1, 1.0, 1.0, ())))
+    above.say(encode_message(DepthReading(1, 1.0, 1.0, ())))
     assert tube.counters["bad_payloads"] == 1
     with pytest.raises(DecodeError):
-        decode(b"")
+        decode_message(b"")
 
 
 def test_only_who_was_asked_answers_an_order() -> None:
     base = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
     link = HopLink(ENCODER, 1)
-    link.send_best_effort(encode(Hello(ENCODER, 1, 0, Mode.BOOT, 1.0)), "hello")
+    link.send_best_effort(encode_message(Hello(ENCODER, 1, 0, NodeMode.BOOT, 1.0)), "hello")
     base.mail.command(Command(3, 9, "take_survey"), 100.0)
     heard: list[object] = []
     for reply in (None, Reply(2, 9, False, "stolen"), Reply(3, 9, True, ""), Reply(3, 9, True, "again")):
         if reply is not None:
-            link.send_best_effort(encode(reply), reply.detail)
+            link.send_best_effort(encode_message(reply), reply.detail)
         for frame in link.take_frames(100.0):
             heard += [received.message for received in base.receive(Side.LOWER, frame.payload, 100.0)]
     assert heard == [Reply(3, 9, True, "")]

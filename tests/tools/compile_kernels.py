@@ -16,7 +16,7 @@ def floats() -> None:
     """The usual kernel of a node and the string of the studies around it, the published form of it, and surveys."""
     from groundstation.survey.well.compiled_model import preload_models
 
-    importlib.import_module("borechain.preload")
+    importlib.import_module("borechain.drilling.preload")
     from sim.studies.lab import LAB, run_seed
     from sim.studies.published_form.published_step import published_loop
 

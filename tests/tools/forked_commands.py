@@ -27,7 +27,7 @@ from typing import IO, Any
 from sim.one_thread import one_thread_each
 
 LAZY = ("matplotlib.pyplot", "scipy.optimize", "scipy.stats", "scipy.signal", "scipy.spatial")  # inside commands
-WARM = "borechain.preload"
+WARM = "borechain.drilling.preload"
 RUN = int(os.environ.get("BORECHAIN_TEST_RUN", os.getpid()))  # pid of what all workers of the tests descend from
 END = b"end"
 LONGEST = 1 << 16  # bytes of an order

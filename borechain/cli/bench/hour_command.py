@@ -6,7 +6,7 @@ import json
 import tempfile
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -19,9 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from borechain.load.hour import Weight
-    from sim.rig.processes import ProcessTable
 
-SAMPLES = 60
 COLUMNS = tuple(
     (name, name.replace("_", " ")) for name in ("hours", "process", "private_mb", "handles", "database_kb", "surveys")
 )
@@ -47,11 +45,12 @@ def hour(tubes: int, seconds: float, speed: float, endpoint: str, out: Path | No
     Example:
       borechain bench hour --seconds 3600 --out docs/results
     """
+    from borechain.load.weighed_rig import weigh_rig
     from sim.rig.launcher import check_port_free
 
     check_port_free(endpoint)
     with tempfile.TemporaryDirectory(prefix="borechain-") as folder:
-        weights, result = weighed_rig(tubes, seconds, speed, endpoint, Path(folder))
+        weights, result = weigh_rig(tubes, seconds, speed, endpoint, Path(folder))
     if out is not None:
         write_hour_files(weights, out)
     if as_json:
@@ -60,34 +59,6 @@ def hour(tubes: int, seconds: float, speed: float, endpoint: str, out: Path | No
         show_process_weights(weights)
     if result["missing"] or result["restarts"]:
         raise EnvironmentFault(f"{result['missing']} surveys are missing, {result['restarts']} processes started again")
-
-
-def weighed_rig(
-    tubes: int, seconds: float, speed: float, endpoint: str, folder: Path
-) -> tuple[list[Weight], dict[str, Any]]:
-    """Drill for ``seconds`` of wall time; what the processes weighed, and what came of it."""
-    from borechain.cli.rig.result import result_of
-    from borechain.cli.rig.rig_command import RigJob, drill_in_processes, process_table, world_of
-    from borechain.load.hour import Scales, scenario_text
-    from borechain.rig_host import opened_router
-
-    scenario, run = folder / "hour.toml", folder / "run"
-    scenario.write_text(scenario_text(tubes, seconds * speed))
-    run.mkdir()
-    job = RigJob(scenario, 1, speed, endpoint=endpoint)
-    world = world_of(job)
-    scales: list[Scales] = []
-
-    def table_of(*place: Any) -> ProcessTable:
-        table = process_table(world, job, run, None, *place)
-        scales.append(Scales(table, run / "state" / "ground" / "ground.sqlite", seconds / SAMPLES))
-        return table
-
-    with opened_router(endpoint) as bus:
-        ran = drill_in_processes(world, job, bus, lambda _tick: scales[0].on_tick(), None, table_of)
-    found = result_of(ran.answers, world)
-    figures = {"surveys": found["measurements"], "missing": len(found["missing"]), "restarts": ran.restarts}
-    return scales[0].weights, {"bench": "hour", "tubes": tubes, "seconds": seconds, "speed": speed} | figures
 
 
 def write_hour_files(weights: Sequence[Weight], out: Path) -> None:

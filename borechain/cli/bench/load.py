@@ -123,12 +123,15 @@ def learn(surveys: int, tubes: int, stops: int, as_json: bool) -> None:
     """
     from borechain.cli.console_tables import show_table
     from borechain.load.learning import measure_learning
-    from groundstation.host import load_kernels
+    from borechain.load.placing_calls import CALLS_AT_MOST, count_placing_calls
+    from groundstation.ground_host import load_kernels
 
     load_kernels()
     with tempfile.TemporaryDirectory(prefix="borechain-") as folder:
         result: dict[str, Any] = {"bench": "learn", "tubes": tubes}
         result |= measure_learning(surveys, tubes, stops, Path(folder))
+        calls = count_placing_calls(Path(folder) / "calls")
+        result["calls_to_place_one"] = {"max": max(calls), "bound": CALLS_AT_MOST, "holds": max(calls) <= CALLS_AT_MOST}
     if as_json:
         click.echo(json.dumps(result))
         return
@@ -136,6 +139,7 @@ def learn(surveys: int, tubes: int, stops: int, as_json: bool) -> None:
     show_table(f"{result['surveys']} surveys at {result['stations']} stations, CPU time", result["figures"], columns)
     sizes = ", ".join(f"{size:.0f} bytes {of}" for of, size in result["store_bytes_of_a_survey"].items())
     click.echo(f"database, for each survey: {sizes}")
+    click.echo(f"Python calls of the ground station to place one: {max(calls)} at most, the bound is {CALLS_AT_MOST}")
 
 
 def latency_line(what: str, figures: dict[str, Any]) -> str:

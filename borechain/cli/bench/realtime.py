@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +14,6 @@ from borechain.cli.faults import plain_faults, require_modules
 from borechain.cli.shared_options import json_option, seed_option
 from telemetry import keys
 
-RIG = "realtime"
-START_ALLOWANCE = 0.25  # s a node, for which the string rests longer
-CLOCK_STD = 10.0  # s, of a node's clock against the encoder's
-SPARE = 120.0  # s, that the recordings are longer than the run
 COLUMNS: Columns = (
     ("process", "process"),
     ("hop", "hop"),
@@ -64,52 +59,19 @@ def realtime(nodes: int, seconds: float, endpoint: str, out: Path | None, as_jso
     Example:
       borechain bench realtime --nodes 50 --seconds 120
     """
+    from borechain.load.realtime_string import measure_realtime_string
     from sim.rig.launcher import check_port_free
-    from sim.rig.realtime import run
 
     check_port_free(endpoint)
     with tempfile.TemporaryDirectory(prefix="borechain-") as place:
-        world, table = prepare_processes(nodes, seconds, endpoint, Path(place), seed)
-        measured = run(world, table, RIG, endpoint, seconds, Path(place))
-        result: dict[str, Any] = {"bench": "realtime", "nodes": nodes, "seconds": seconds} | measured
+        measured = measure_realtime_string(nodes, seconds, endpoint, Path(place), seed)
+    result: dict[str, Any] = {"bench": "realtime", "nodes": nodes, "seconds": seconds} | measured
     if out is not None:
         write_table(out / "realtime.csv", result["cases"], COLUMNS)
     if as_json:
         click.echo(json.dumps(result))
     else:
         show_realtime_table(result)
-
-
-def prepare_processes(nodes: int, seconds: float, endpoint: str, folder: Path, seed: int) -> tuple[Any, Any]:
-    """Record the string and write the table of its processes."""
-    from node.process.drivers.timed import TimedEncoder, TimedImu
-    from node.process.node_host import run_encoder, run_node
-    from sim.rig.processes import ProcessTable, Spec
-    from sim.rig.realtime import clock_offset
-    from sim.world.recording import record, turning_once
-    from telemetry.messages import BASE, ENCODER, Side
-    from telemetry.runtime.hosting import OwnTime, Place
-
-    rest = START_ALLOWANCE * nodes + 0.5 * seconds
-    length = rest + seconds + SPARE
-    world = turning_once(nodes, time.monotonic(), rest, 0.25 * seconds, length, seed, CLOCK_STD)
-    record(world, folder)
-    order = [BASE, ENCODER, *range(nodes, 0, -1)]
-    specs = {}
-    for place in range(1, len(order)):
-        address = order[place]
-        neighbours = {Side.UPPER: order[place - 1]}
-        if place + 1 < len(order):
-            neighbours[Side.LOWER] = order[place + 1]
-        own_time = OwnTime(neighbours, clock_offset(world, address))
-        name = "encoder" if address == ENCODER else str(address)
-        at = Place(RIG, endpoint, folder / name)
-        if address == ENCODER:
-            specs[name] = Spec(run_encoder, (at, TimedEncoder(folder / "encoder.npy"), own_time))
-        else:
-            imu = TimedImu(folder / f"tube-{address}.npy")
-            specs[name] = Spec(run_node, (at, world.tube_settings(address), [imu], own_time))
-    return world, ProcessTable(specs, ["borechain.preload"])
 
 
 def show_realtime_table(result: dict[str, Any]) -> None:

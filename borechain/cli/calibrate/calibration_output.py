@@ -1,16 +1,15 @@
-"""What every calibration command shares: its result, the files it lands whole or not at all, and what it prints."""
+"""What every calibration command shares: its files, which land whole or not at all, and what it prints."""
 
 from __future__ import annotations
 
 import contextlib
-import functools
+import datetime
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, date, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -22,7 +21,8 @@ from borechain.cli.whole_files import PLOT_FORMATS, check_suffix
 from telemetry.runtime.command_line import check_installed
 
 if TYPE_CHECKING:
-    from groundstation.report.figure_panels import Panel
+    from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome
+    from groundstation.report.calibrations.calibration_request import CalibrationRequest
     from groundstation.report.sheet import Sheet
 
 file_argument = click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
@@ -32,97 +32,58 @@ full_scale_option = click.option(
     default=1e30,
     help="Range of the sensor, in the unit of its readings; a saturated reading is refused.",
 )
+PATH = click.Path(path_type=Path, dir_okay=False)
+output_options = (
+    click.option("--out", type=PATH, help="Result as a .json file, with the record it was made from."),
+    click.option("--plot", type=PATH, help="Figures as .svg, .png or .pdf."),
+    click.option("--certificate", type=PATH, help="Certificate as PDF."),
+    click.option("--date", type=click.DateTime(["%Y-%m-%d"]), help="Day of the calibration.  [default: today, UTC]"),
+    click.option("--subject", help="What was calibrated, for the certificate.  [default: name of FILE]"),
+    json_option,
+)  # of WantedFiles
 
 
 @dataclass(frozen=True, slots=True)
-class CalibrationOutcome:
-    """A calibration: the JSON object, the text of its file, its sheet and its figures, drawn when asked for."""
-
-    result: dict[str, Any]
-    document: str
-    block_sha256: str | None
-    record_sha256: str
-    sheet: Sheet
-    panels: Callable[[], Sequence[Panel]]
-
-
-@dataclass(frozen=True, slots=True)
-class Wanted:
+class WantedFiles:
     """Files to write and how to print."""
 
     file: Path
     out: Path | None
     plot: Path | None
     certificate: Path | None
-    day: date
-    subject: str
+    date: datetime.datetime | None
+    subject: str | None
     as_json: bool
 
+    @property
+    def day(self) -> datetime.date:
+        """Day of the calibration, that of today in UTC by default."""
+        return (self.date or datetime.datetime.now(datetime.UTC)).date()
+
     def check(self) -> None:
-        """Refuse paths that cannot be meant, before anything is computed."""
+        """Refuse paths that cannot be meant, and what is not installed, before anything is computed."""
         paths = [self.file, *filter(None, (self.out, self.plot, self.certificate))]
         if len({path.resolve() for path in paths}) < len(paths):
             raise InputFault("expected different files for the record, --out, --plot and --certificate")
         check_suffix("--plot", self.plot, *PLOT_FORMATS)
         check_suffix("--certificate", self.certificate, ".pdf")
         check_suffix("--out", self.out, ".json")
-
-
-@contextlib.contextmanager
-def faults_of_file(file: Path) -> Iterator[None]:
-    """Put the name of the file in front of what the mathematics refuses."""
-    from groundstation.calibration.errors import CalibrationError
-
-    try:
-        yield
-    except CalibrationError as error:
-        raise InputFault(f"{file.name}: {error}") from error
-
-
-def output_options(command: Callable[..., CalibrationOutcome]) -> Callable[..., None]:
-    """Options --out, --plot, --certificate, --date, --subject and --json of a command that returns an `Outcome`."""
-
-    @functools.wraps(command)
-    def delivering(
-        file: Path,
-        out: Path | None,
-        plot: Path | None,
-        certificate: Path | None,
-        date: datetime | None,
-        subject: str | None,
-        as_json: bool,
-        **options: Any,
-    ) -> None:
-        day = (date or datetime.now(UTC)).date()
-        wanted = Wanted(file, out, plot, certificate, day, subject or file.stem, as_json)
-        wanted.check()
-        if plot is not None or certificate is not None:
+        if self.plot is not None or self.certificate is not None:
             check_installed("matplotlib", "typst")
-        deliver_outcome(command(file=file, day=day.isoformat(), **options), wanted)
-
-    path = click.Path(path_type=Path, dir_okay=False)
-    decorated: Callable[..., None] = delivering
-    for option in (
-        json_option,
-        click.option("--subject", help="What was calibrated, for the certificate.  [default: name of FILE]"),
-        click.option(
-            "--date", type=click.DateTime(["%Y-%m-%d"]), help="Day of the calibration.  [default: today, UTC]"
-        ),
-        click.option("--certificate", type=path, help="Certificate as PDF."),
-        click.option("--plot", type=path, help="Figures as .svg, .png or .pdf."),
-        click.option("--out", type=path, help="Result as a .json file, with the record it was made from."),
-    ):
-        decorated = option(decorated)
-    return decorated
 
 
-def deliver_outcome(outcome: CalibrationOutcome, wanted: Wanted) -> None:
-    """Make every file, land them all, then print."""
+def deliver_calibration(request: CalibrationRequest, wanted: WantedFiles) -> None:
+    """Calibrate, make every file, land them all, then print."""
+    from borechain import api
+
+    wanted.check()
+    day = wanted.day
+    outcome = api.calibrate(request, day)
     files: dict[Path, bytes] = {}
     if wanted.out is not None:
         files[wanted.out] = outcome.document.encode()
     if wanted.plot is not None or wanted.certificate is not None:
-        files |= rendered_files(outcome, wanted)
+        files |= rendered_files(outcome, wanted, day)
     write_files_whole(files)
     if wanted.as_json:
         click.echo(json.dumps(outcome.result, allow_nan=False))
@@ -130,7 +91,7 @@ def deliver_outcome(outcome: CalibrationOutcome, wanted: Wanted) -> None:
         show_sheet(outcome.sheet, list(files))
 
 
-def rendered_files(outcome: CalibrationOutcome, wanted: Wanted) -> dict[Path, bytes]:
+def rendered_files(outcome: CalibrationOutcome, wanted: WantedFiles, day: datetime.date) -> dict[Path, bytes]:
     """Plot and certificate."""
     from groundstation.report.certificate import Identity, certificate_pdf
     from groundstation.report.figure_panels import render_panels
@@ -139,9 +100,8 @@ def rendered_files(outcome: CalibrationOutcome, wanted: Wanted) -> dict[Path, by
     if wanted.plot is not None:
         files[wanted.plot] = render_panels(panels, wanted.plot.suffix[1:])
     if wanted.certificate is not None:
-        identity = Identity(
-            wanted.subject, wanted.day, wanted.file.name, outcome.record_sha256, outcome.block_sha256, __version__
-        )
+        subject, record = wanted.subject or wanted.file.stem, wanted.file
+        identity = Identity(subject, day, record.name, outcome.record_sha256, outcome.block_sha256, __version__)
         files[wanted.certificate] = certificate_pdf(outcome.sheet, panels, identity)
     return files
 

@@ -59,7 +59,7 @@ def campaign(
         raise InputFault(f"--first {first} --runs {runs}: expected a last run of at most {LARGEST_RUN}")
     for package in ("pyarrow", "matplotlib", "scipy", *(["distributed"] if engine == "dask" else [])):
         check_installed(package)
-    from sim.campaign.run import run_campaign
+    from sim.campaign.campaign_run import run_campaign
     from sim.world.scenario import load_scenario
 
     loaded = load_scenario(scenario)
@@ -79,7 +79,7 @@ def campaign(
 def write_campaign(folder: Path, result: dict[str, Any]) -> None:
     """Write tables and pictures beside the runs."""
     from groundstation.report.style import save_figure
-    from sim.campaign.figure import accuracy_figure, honesty_figure
+    from sim.campaign.campaign_figures import accuracy_figure, honesty_figure
     from sim.campaign.summary import ACCURACY, HONESTY
 
     title = f"{result['scenario']}, {result['runs']} runs"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from borechain.cli.faults import EnvironmentFault, InputFault, plain_faults, require_modules
+from telemetry.runtime.typed_options import gather_options
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,47 +18,59 @@ if TYPE_CHECKING:
     from borechain.gauntlet.gauntlet_run import SeedOutcome
     from borechain.gauntlet.soak import SoakSample
 
-WORTH_A_PROCESS = 50  # seeds, for which a process more is started
-BATCH = 200  # seeds shown at a time
 COLUMNS = tuple(
     (name, name)
     for name in ("hours", "memory_mib", "disks_mib", "objects", "handles", "database_kib", "surveys", "wrong", "cpu_s")
 )
 
 
+@dataclass(frozen=True, slots=True)
+class GauntletRequest:
+    """Which seeds run, with which faults, on which plan."""
+
+    seeds: int
+    first: int
+    seed: int | None
+    faults: str | None
+    exactly: str | None
+    plan: str
+
+    @property
+    def numbers(self) -> list[int]:
+        """Every seed."""
+        return [self.seed] if self.seed is not None else list(range(self.first, self.first + self.seeds))
+
+
+gauntlet_options = gather_options(
+    click.option("--seeds", type=click.IntRange(1), default=20, show_default=True, help="How many seeds to run."),
+    click.option("--from", "first", type=click.IntRange(0), default=1, show_default=True, help="The first of them."),
+    click.option("--seed", type=click.IntRange(0), help="Repeat this one seed."),
+    click.option("--faults", help="Kinds of faults to draw from, as a,b,c  [default: all]."),
+    click.option("--exactly", help="Kinds of faults to switch on, whatever the seed says, as a,b,c."),
+    click.option("--list", "listed", is_flag=True, help="List the kinds of faults."),
+    click.option(
+        "--plan",
+        type=click.Choice(["minute", "drilled-in"]),
+        default="minute",
+        show_default=True,
+        help="A string that drills for a minute, or one that is drilled in tube by tube.",
+    ),
+    click.option(
+        "--soak", "hours", type=click.FloatRange(1.0), help="Instead, hours of rig time of one rig under faults."
+    ),
+    click.option(
+        "--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for soak.csv and soak.svg; with --soak."
+    ),
+    click.option("--json", "as_json", is_flag=True, help="Print one JSON object a seed, and one of the whole."),
+    request=GauntletRequest,
+)
+
+
 @click.command()
-@click.option("--seeds", type=click.IntRange(1), default=20, show_default=True, help="How many seeds to run.")
-@click.option("--from", "first", type=click.IntRange(0), default=1, show_default=True, help="The first of them.")
-@click.option("--seed", type=click.IntRange(0), help="Repeat this one seed.")
-@click.option("--faults", help="Kinds of faults to draw from, as a,b,c  [default: all].")
-@click.option("--exactly", help="Kinds of faults to switch on, whatever the seed says, as a,b,c.")
-@click.option("--list", "listed", is_flag=True, help="List the kinds of faults.")
-@click.option(
-    "--plan",
-    type=click.Choice(["minute", "drilled-in"]),
-    default="minute",
-    show_default=True,
-    help="A string that drills for a minute, or one that is drilled in tube by tube.",
-)
-@click.option("--soak", "hours", type=click.FloatRange(1.0), help="Instead, hours of rig time of one rig under faults.")
-@click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for soak.csv and soak.svg; with --soak."
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object a seed, and one of the whole.")
+@gauntlet_options
 @require_modules("scipy", "sqlalchemy")
 @plain_faults
-def gauntlet(
-    seeds: int,
-    first: int,
-    seed: int | None,
-    faults: str | None,
-    exactly: str | None,
-    listed: bool,
-    hours: float | None,
-    plan: str,
-    out: Path | None,
-    as_json: bool,
-) -> None:
+def gauntlet(request: GauntletRequest, listed: bool, hours: float | None, out: Path | None, as_json: bool) -> None:
     """Drill with a string of two tubes in this process under faults that each seed draws; judge what the crew sees.
 
     \b
@@ -66,28 +79,40 @@ def gauntlet(
       borechain gauntlet --seed 17 --exactly node-cut,loss
       borechain gauntlet --soak 24
     """
-    from borechain.gauntlet.gauntlet_run import ALL, judge_seed
-    from sim.gauntlet.fault_kinds import KINDS
-    from sim.studies.pool import over_cores
-
     if listed:
-        for kind in KINDS:
-            click.echo(f"{kind.name:20} {kind.meaning}")
-        return
-    if hours is not None:
-        _soak(hours, first, out, as_json=as_json)
-        return
-    if out is not None:
+        list_faults()
+    elif hours is not None:
+        _soak(hours, request.first, out, as_json=as_json)
+    elif out is not None:
         raise InputFault("--out: expected --soak with it")
-    allowed, kinds = _names(faults, "--faults", ALL), _names(exactly, "--exactly", ()) or None
-    numbers = [seed] if seed is not None else list(range(first, first + seeds))
-    failed, cpu_s = 0, 0.0
-    with over_cores(len(numbers) // WORTH_A_PROCESS, lambda: None) as run_all:
-        for batch in (numbers[k : k + BATCH] for k in range(0, len(numbers), BATCH)):
-            for outcome in run_all(judge_seed, [(number, allowed, kinds, plan) for number in batch]):
-                failed += bool(outcome.violations)
-                cpu_s += outcome.cpu_s
-                _show(outcome, as_json=as_json)
+    else:
+        run_seeds(request, as_json=as_json)
+
+
+def list_faults() -> None:
+    """Kinds of faults, one a line."""
+    from sim.gauntlet.fault_kinds import KINDS
+
+    for kind in KINDS:
+        click.echo(f"{kind.name:20} {kind.meaning}")
+
+
+def run_seeds(request: GauntletRequest, *, as_json: bool) -> None:
+    """Run every seed and show it.
+
+    Raises
+    ------
+    EnvironmentFault
+        When one has failed.
+    """
+    from borechain.gauntlet.gauntlet_run import ALL, judge_seeds
+
+    allowed, kinds = _names(request.faults, "--faults", ALL), _names(request.exactly, "--exactly", ()) or None
+    numbers, failed, cpu_s = request.numbers, 0, 0.0
+    for outcome in judge_seeds(numbers, allowed, kinds, request.plan):
+        failed += bool(outcome.violations)
+        cpu_s += outcome.cpu_s
+        _show(outcome, as_json=as_json)
     _show_figures(len(numbers), failed, cpu_s, as_json=as_json)
     if failed:
         raise EnvironmentFault(f"{failed} of {len(numbers)} seeds failed; each is named above with what repeats it")

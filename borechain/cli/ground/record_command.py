@@ -10,20 +10,20 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from borechain.cli.faults import EnvironmentFault, plain_faults, require_modules
 from borechain.cli.ground.query import rig_option, role_option
 from borechain.cli.shared_options import parse_speed
-from groundstation.page_options import page_settings
+from groundstation.page_options import PageRequest, page_settings
 from telemetry import keys
 from telemetry.media.credentials import Credentials, credentials_for
 from telemetry.runtime.process_options import insecure_option, keys_option
 
 if TYPE_CHECKING:
-    from borechain.recording.recorder import RecordingSummary
+    from groundstation.recording.recorder import RecordingSummary
     from telemetry.media.zenoh_bus import ZenohBus
 
 ONE_TRY = 2.0  # wall s to join a router that may not be there yet
@@ -71,7 +71,7 @@ def record_rig(
     MediumError
         When no router is there by then.
     """
-    from borechain.recording.recorder import Recorder
+    from groundstation.recording.recorder import Recorder
 
     with contextlib.ExitStack() as stack:
         recorder = Recorder(stack.enter_context(patient_client(endpoint, wait, credentials)), rig_name, file)
@@ -127,19 +127,21 @@ def replay(file: Path, folder: Path | None, page: str | None, speed: float, as_j
       borechain replay shift.mcap --json
       borechain replay shift.mcap --page 127.0.0.1:8080 --speed 60
     """
-    from borechain.recording.recording_file import Recording
+    from groundstation.recording.recording_file import Recording
 
     recording = Recording(file)
     if folder is not None and folder.exists() and any(folder.iterdir()):
         raise EnvironmentFault(f"folder {folder}: expected a new or empty one, it holds something")
-    shown = page_settings(page, None, None)
+    shown = page_settings(PageRequest(page))
     with tempfile.TemporaryDirectory(prefix="borechain-") as place:
         if shown is not None:
-            from borechain.recording.show import show_recording
+            from groundstation.recording.show import show_recording
 
             show_recording(recording, folder or Path(place), replace(shown, replay=file.name), speed)
             return
-        result = replay_summary(recording, folder or Path(place))
+        from borechain import api
+
+        result = api.replay(recording, folder or Path(place))
     if as_json:
         click.echo(json.dumps(result))
         return
@@ -149,26 +151,3 @@ def replay(file: Path, folder: Path | None, page: str | None, speed: float, as_j
     click.echo(result["verdict"]["line"])
     click.echo(f"{result['events']} events, {result['missing']} missing; {'whole' if result['whole'] else 'cut'} file")
     click.echo(f"digest {result['digest']}")
-
-
-def replay_summary(recording: Any, folder: Path) -> dict[str, Any]:
-    """What a ground station knows after a replay."""
-    from borechain.recording.ground_replay import replay_file
-    from sim.rig.report import digest
-
-    done = replay_file(recording, folder)
-    ask = done.ground.operator.ask
-    try:
-        stations = ask("stations")["stations"]
-        return {
-            "rig": recording.rig,
-            "whole": recording.whole,
-            "events": done.events,
-            "missing": done.missing,
-            "stations": stations,
-            "verdict": ask("verdict"),
-            "alarms": ask("alarms")["open"],
-            "digest": digest(stations),
-        }
-    finally:
-        done.ground.close()

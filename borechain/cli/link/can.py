@@ -70,7 +70,7 @@ def dbc(check: Path | None) -> None:
       borechain link dbc > borechain.dbc
       borechain link dbc --check their.dbc
     """
-    from telemetry.presentation.can_dbc import dbc_text, differences
+    from telemetry.presentation.can_dbc import database_differences, dbc_text
 
     if check is None:
         click.echo(dbc_text(), nl=False)
@@ -82,7 +82,7 @@ def dbc(check: Path | None) -> None:
         database = cantools.database.load_file(str(check))
     except (cantools.Error, UnicodeDecodeError) as error:
         raise InputFault(f"{check}: expected a DBC file: {error}") from error
-    found = differences(database)
+    found = database_differences(database)
     if found:
         raise InputFault("\n".join(f"{check}: {line}" for line in found))
     click.echo("no difference")

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 import click
 
 from borechain.cli.faults import plain_faults, require_modules
-from borechain.cli.rig.rig_command import RigJob, drill_in_processes, page_with_password, process_table, world_of
+from borechain.cli.notices import print_notice
 from borechain.cli.shared_options import parse_speed
-from groundstation.page_options import DEFAULT, page_settings
+from borechain.drilling.rig_job import RigJob, show_nothing
+from groundstation.page_options import DEFAULT, PageRequest, page_settings
 from telemetry import keys
 from telemetry.runtime.process_options import insecure_option, secure_endpoint
 
@@ -50,17 +51,18 @@ def demo(page: str, speed: float, endpoint: str, rounds: int | None) -> None:
       borechain demo
       borechain demo --speed 2 --page 127.0.0.1:8090
     """
-    from borechain.rig_host import opened_router
+    from borechain.drilling.drill_hole import page_with_password
+    from borechain.drilling.rig_host import opened_router
     from groundstation.gateway.page.page_settings import open_page_socket
     from sim.rig.launcher import check_port_free
     from sim.world.shipped import find_scenario
 
-    settings = page_settings(page, None, None)
+    settings = page_settings(PageRequest(page))
     if settings is None:
         return
     open_page_socket(settings).close()
     check_port_free(endpoint)
-    served = page_with_password(settings)
+    served = page_with_password(settings, print_notice)
     click.echo(f"open {served.url} in a browser; Ctrl-C ends the demonstration")
     try:
         with opened_router(endpoint) as bus:
@@ -75,5 +77,8 @@ def demo(page: str, speed: float, endpoint: str, rounds: int | None) -> None:
 
 def drill_demo_hole(job: RigJob, bus: ZenohBus, page: PageSettings, folder: Path) -> None:
     """One hole."""
-    world = world_of(job)
-    drill_in_processes(world, job, bus, lambda _tick: None, None, partial(process_table, world, job, folder, page))
+    from borechain.drilling.drill_hole import read_world
+    from borechain.drilling.rig_processes import drill_in_processes, process_table
+
+    world = read_world(job, print_notice)
+    drill_in_processes(world, job, bus, show_nothing, None, partial(process_table, world, job, folder, page))

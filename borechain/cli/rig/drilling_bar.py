@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from sim.rig.launcher import Tick
-    from sim.rig.scheduler import Progress
+    from sim.rig.scheduler import RigProgress
     from sim.world.world import World
 
 
-class progress:  # noqa: N801
-    """Progress bar on stderr, silent for scripts."""
+class DrillingBar:
+    """Progress bar on stderr."""
 
-    def __init__(self, world: World, *, quiet: bool) -> None:
+    def __init__(self, world: World) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -24,16 +24,15 @@ class progress:  # noqa: N801
             TextColumn("{task.completed:.0f}/{task.total:.0f} s of rig time"),
             TimeRemainingColumn(),
             console=Console(stderr=True),
-            disable=quiet,
         )
         self._task = self._bar.add_task("starting", total=world.end - world.begin)
 
-    def __enter__(self) -> Callable[[Tick | Progress], None]:
+    def __enter__(self) -> Callable[[Tick | RigProgress], None]:
         self._bar.start()
         return self._show
 
     def __exit__(self, *_: object) -> None:
         self._bar.stop()
 
-    def _show(self, tick: Tick | Progress) -> None:
+    def _show(self, tick: Tick | RigProgress) -> None:
         self._bar.update(self._task, completed=tick.rig_time - tick.begin, description=tick.phase)

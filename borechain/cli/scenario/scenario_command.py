@@ -31,9 +31,9 @@ def group() -> None:
 @plain_faults
 def list_(as_json: bool) -> None:
     """Name every scenario, with what its file says of itself."""
-    from sim.world.shipped import shipped_folder, shipped_names, title
+    from sim.world.shipped import scenario_title, shipped_folder, shipped_names
 
-    titles = {name: title(shipped_folder() / f"{name}.toml") for name in shipped_names()}
+    titles = {name: scenario_title(shipped_folder() / f"{name}.toml") for name in shipped_names()}
     if as_json:
         click.echo(json.dumps({"scenarios": titles, "folder": str(shipped_folder())}))
         return

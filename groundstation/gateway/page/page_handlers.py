@@ -21,7 +21,7 @@ from groundstation.gateway.page.request_guard import RequestError, check_origin,
 from groundstation.gateway.page.sessions import OperatorSession, Sessions, WrongPasswords, is_from
 from groundstation.service.answers.csv_tables import table_of
 from groundstation.service.answers.paths import check_parameters, find_path
-from groundstation.service.orders.order_book import Order
+from groundstation.service.orders.order_book import SentOrder
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.operator_access import check_name
 from telemetry.errors import TelemetryError
@@ -226,7 +226,7 @@ async def send_chunk(send: Send, packet: bytes) -> None:
         await send({"type": "http.response.body", "body": packet, "more_body": True})
 
 
-async def await_answer(order: Order) -> None:
+async def await_answer(order: SentOrder) -> None:
     """Wait until an order is answered, for a time."""
     done = asyncio.Event()
     order.when_answered(done.set)

@@ -47,7 +47,7 @@ class ReportTypesetter:
             raise RequestError(404, "report: this rig has no wall; see --wall and --hole of borechain ground")
         if self._is_busy:
             raise RequestError(503, "another report is being made", retry_after=REPORT_WITHIN_S)
-        found = wall.judged(stations_of(self._model), self._model.depths.latest)
+        found = wall.judged(stations_of(self._model), self._model.string.bit)
         stations = find_path(self._model, "stations")
         text = table_of("stations", stations.fields, stations.show(self._model, {}))
         inputs = [*wall.inputs, ("the stations of this rig", hashlib.sha256(text.encode()).hexdigest())]

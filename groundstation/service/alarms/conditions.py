@@ -5,31 +5,32 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from groundstation.service.alarms.crew_alarms import Condition
-from groundstation.service.alarms.rig_alarms import Level
-from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.verdict_views import FINEST_CM
-from groundstation.service.hole.deviation_alarms import Alarm
+from groundstation.service.alarms.rig_alarms import Level, RigAlarms
+from groundstation.service.alarms.verdict import FINEST_CM
+from groundstation.service.hole.deviation_alarms import DeviationAlarm
+from groundstation.service.hole.surveyed_hole import SurveyedHole
+from groundstation.service.string.known_string import KnownString
 from groundstation.survey.wall.column_deviation import LEVELS
 
 LEVEL_OF = dict(zip(LEVELS, (Level.NOTICE, Level.DEGRADED, Level.BAD), strict=True))
 
 
-def conditions_of(k: RigModel) -> list[Condition]:
+def conditions_of(alarms: RigAlarms, string: KnownString, hole: SurveyedHole) -> list[Condition]:
     """Everything that stands: one condition a kind of deviation, at the highest level reached."""
-    return [*_of_the_rig(k), *_of_the_column(k)]
+    return [*_of_the_rig(alarms, string), *_of_the_column(hole)]
 
 
-def _of_the_rig(k: RigModel) -> Iterator[Condition]:
-    for alarm in k.rig_alarms:
+def _of_the_rig(alarms: RigAlarms, string: KnownString) -> Iterator[Condition]:
+    for alarm in alarms:
         kind = alarm.kind
         yield Condition(
-            kind.code, alarm.subject, kind.level, alarm.detail, _depth_of(k, alarm.subject), count=alarm.count
+            kind.code, alarm.subject, kind.level, alarm.detail, _depth_of(string, alarm.subject), count=alarm.count
         )
 
 
-def _of_the_column(k: RigModel) -> Iterator[Condition]:
-    highest: dict[str, Alarm] = {}
-    for alarm in k.hole.alarms.active:
+def _of_the_column(hole: SurveyedHole) -> Iterator[Condition]:
+    highest: dict[str, DeviationAlarm] = {}
+    for alarm in hole.alarms.active:
         if alarm.kind not in highest or alarm.level > highest[alarm.kind].level:
             highest[alarm.kind] = alarm
     for kind, alarm in highest.items():
@@ -38,9 +39,8 @@ def _of_the_column(k: RigModel) -> Iterator[Condition]:
         yield Condition(kind, "column", LEVEL_OF[alarm.level], detail, alarm.md, alarm.direction, threshold)
 
 
-def _depth_of(k: RigModel, subject: str) -> float | None:
+def _depth_of(string: KnownString, subject: str) -> float | None:
     """Measured depth (m) of the node that an alarm is about."""
     name, _, number = subject.partition(" ")
-    below = k.tally.length_below(int(number)) if name == "tube" and number.isdecimal() else None
-    bit = k.depths.latest
-    return None if bit is None or below is None else max(bit - below, 0.0)
+    md = string.depth_of_node(int(number)) if name == "tube" and number.isdecimal() else None
+    return None if md is None else max(md, 0.0)

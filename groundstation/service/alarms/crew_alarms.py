@@ -28,7 +28,7 @@ FLOOD_FROM, FLOOD_UNTIL = 10, 5  # alarms raised within ten minutes
 Key = tuple[str, str]  # code and subject
 
 
-class State(enum.StrEnum):
+class AlarmState(enum.StrEnum):
     """How far an alarm is."""
 
     RAISED = "raised"  # its condition stands, not acknowledged
@@ -83,16 +83,16 @@ class CrewAlarm:
     cleared_at: float | None = None  # s, rig time, of the condition
     dropped: bool = False  # for want of room
 
-    def state(self, utc: float) -> State:
+    def state(self, utc: float) -> AlarmState:
         """State at a time (UTC, s)."""
         if self.dropped:
-            return State.CLEARED
+            return AlarmState.CLEARED
         if utc < self.shelved_until:
-            return State.SHELVED
+            return AlarmState.SHELVED
         if self.stands:
-            return State.ACKNOWLEDGED if self.acknowledged_by else State.RAISED
+            return AlarmState.ACKNOWLEDGED if self.acknowledged_by else AlarmState.RAISED
         latches = self.condition.level is Level.BAD and not self.acknowledged_by
-        return State.LATCHED if latches else State.CLEARED
+        return AlarmState.LATCHED if latches else AlarmState.CLEARED
 
 
 class CrewAlarms:
@@ -132,7 +132,7 @@ class CrewAlarms:
         """Go on with stored alarms; the conditions that stored data show raise none."""
         for alarm in sorted(stored, key=lambda one: one.number):
             self._newest = max(self._newest, alarm.number)
-            if alarm.state(-math.inf) is State.CLEARED:
+            if alarm.state(-math.inf) is AlarmState.CLEARED:
                 self.cleared.append(alarm)
             else:
                 self._open[alarm.condition.key] = alarm
@@ -187,7 +187,7 @@ class CrewAlarms:
     def put(self, alarm: CrewAlarm) -> None:
         """Take an alarm in the place of the one of its number; one that has cleared by it is closed."""
         self._change(alarm)
-        if alarm.state(self.utc) is State.CLEARED:
+        if alarm.state(self.utc) is AlarmState.CLEARED:
             self._close(alarm)
 
     def drain_changed(self) -> list[CrewAlarm]:
@@ -246,7 +246,7 @@ class CrewAlarms:
         if alarm.stands:
             alarm = replace(alarm, stands=False, cleared_at=times.rig_now)
             self._change(alarm)
-        if alarm.state(times.utc) is State.CLEARED:
+        if alarm.state(times.utc) is AlarmState.CLEARED:
             self._close(alarm)
             self._gone_at[alarm.condition.key] = times.now
 

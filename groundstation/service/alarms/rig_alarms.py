@@ -158,10 +158,10 @@ class RigAlarms:
         """Whether an alarm stands."""
         return (code, subject) in self._standing
 
-    @property
-    def health(self) -> Health:
-        """The worst of what stands."""
-        return max((Health(int(alarm.kind.level)) for alarm in self), default=Health.GOOD)
+    def health_of(self, *, is_known: bool) -> Health:
+        """The worst of what stands, or that nothing is known of the rig."""
+        worst = max((Health(int(alarm.kind.level)) for alarm in self), default=Health.GOOD)
+        return max(worst, Health.GOOD if is_known else Health.UNKNOWN)
 
     def drain_changed(self) -> bool:
         """Whether anything changed since the last call."""

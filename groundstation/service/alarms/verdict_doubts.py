@@ -1,61 +1,68 @@
-"""What a verdict rests on, found in the model: the deviations, and everything that makes them doubtful now."""
+"""What a verdict rests on, found in its parts: the deviations, and everything that makes them doubtful now."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 
-from groundstation.service.alarms.verdict import Doubt, Known
-from groundstation.service.answers.model import RigModel
+from groundstation.config import GroundConfig
+from groundstation.service.alarms.rig_alarms import RigAlarms
+from groundstation.service.alarms.verdict import Known, VerdictDoubt
+from groundstation.service.hole.surveyed_hole import SurveyedHole
+from groundstation.service.string.known_string import KnownString
 
 BEHIND = 1.5  # tubes by which the deepest survey may be behind the bit
 ALARMS = {
-    "depth_refused": Doubt.DEPTH,
-    "depth_contradicts": Doubt.DEPTH,
-    "depth_silent": Doubt.STALE,
-    "clock": Doubt.CLOCK,
+    "depth_refused": VerdictDoubt.DEPTH,
+    "depth_contradicts": VerdictDoubt.DEPTH,
+    "depth_silent": VerdictDoubt.STALE,
+    "clock": VerdictDoubt.CLOCK,
 }
 
 
-def known_of(k: RigModel) -> Known:
-    """What the model knows of the way of the hole."""
-    design = k.config.design
-    worst = k.hole.deviations.worst(first=1)
+def known_of(config: GroundConfig, string: KnownString, hole: SurveyedHole, alarms: RigAlarms) -> Known:
+    """What is known of the way of the hole."""
+    design = config.design
+    worst = hole.deviations.worst(first=1)
     return Known(
         target=design.length,
-        curvature=math.radians(k.config.steering_deg_per_m),
-        bit=k.depths.latest,
+        curvature=math.radians(config.steering_deg_per_m),
+        bit=string.bit,
         worst=worst,
-        projection=k.hole.projection if worst is not None else None,
-        doubts=tuple(_doubts(k)),
+        projection=hole.projection if worst is not None else None,
+        doubts=(
+            *_doubts_of_time(string, alarms, config.stale_after),
+            *_doubts_of_surveys(string, hole, alarms, BEHIND * config.tube_length),
+        ),
     )
 
 
-def _doubts(k: RigModel) -> Iterator[tuple[Doubt, str]]:
-    yield from _doubts_of_time(k)
-    for alarm in k.rig_alarms:
+def _doubts_of_surveys(
+    string: KnownString, hole: SurveyedHole, alarms: RigAlarms, behind: float
+) -> Iterator[tuple[VerdictDoubt, str]]:
+    """What is doubtful of depth and surveys; the deepest may be ``behind`` the bit (m)."""
+    for alarm in alarms:
         if alarm.kind.code in ALARMS:
             yield ALARMS[alarm.kind.code], f"{alarm.subject}: {alarm.detail}"
-    stations = [station for station in k.stations if station.md > 0.0]
+    stations = [station for station in hole.stations if station.md > 0.0]
     if not stations:
         return
-    deepest, bit = stations[-1], k.depths.latest
-    if bit is not None and bit - deepest.md > BEHIND * k.config.tube_length:
-        yield Doubt.STALE, f"the bit is at {bit:.1f} m, the deepest survey at {deepest.md:.1f} m"
+    deepest, bit = stations[-1], string.bit
+    if bit is not None and bit - deepest.md > behind:
+        yield VerdictDoubt.STALE, f"the bit is at {bit:.1f} m, the deepest survey at {deepest.md:.1f} m"
     if not deepest.is_trusted:
-        yield Doubt.YAW, f"the yaw of the survey at {deepest.md:.1f} m is untrusted"
+        yield VerdictDoubt.YAW, f"the yaw of the survey at {deepest.md:.1f} m is untrusted"
 
 
-def _doubts_of_time(k: RigModel) -> Iterator[tuple[Doubt, str]]:
+def _doubts_of_time(string: KnownString, alarms: RigAlarms, stale_after: float) -> Iterator[tuple[VerdictDoubt, str]]:
     """Silence is judged by when messages arrive."""
-    if not math.isfinite(k.rig_now):
-        yield Doubt.CLOCK, "rig time is not known: the encoder is not heard"
-    if k.depths.latest is None:
-        yield Doubt.DEPTH, "no depth of the bit is known"
-    elif k.now - k.depth_heard_at > k.config.stale_after and not k.rig_alarms.stands("depth_silent", "depth"):
-        yield Doubt.STALE, "no reading of the depth comes"
-    silent = [tube for tube in k.tally.tubes if k.is_stale(tube)]
-    if silent:
-        yield Doubt.STALE, f"silent: tube{'s' if len(silent) > 1 else ''} {', '.join(map(str, silent))}"
-    elif not k.tally.tubes:
-        yield Doubt.STALE, "no tube has been heard"
+    if not string.time.is_known:
+        yield VerdictDoubt.CLOCK, "rig time is not known: the encoder is not heard"
+    if string.bit is None:
+        yield VerdictDoubt.DEPTH, "no depth of the bit is known"
+    elif string.depth_age > stale_after and not alarms.stands("depth_silent", "depth"):
+        yield VerdictDoubt.STALE, "no reading of the depth comes"
+    if silent := string.silent:
+        yield VerdictDoubt.STALE, f"silent: tube{'s' if len(silent) > 1 else ''} {', '.join(map(str, silent))}"
+    elif not string.tubes:
+        yield VerdictDoubt.STALE, "no tube has been heard"

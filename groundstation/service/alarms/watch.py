@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from groundstation.service.alarms.witnesses import OFF_BEFORE, Witnesses
-from groundstation.service.answers.model import UNTRUSTED, RigModel
+from groundstation.service.alarms.encoder_cross_check import OFF_BEFORE, EncoderCrossCheck
+from groundstation.service.alarms.rig_alarms import RigAlarms
+from groundstation.service.hole.placement import UNTRUSTED, Placement
+from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.service.string.depth import CONTRADICTION
+from groundstation.service.string.known_string import KnownString
 from groundstation.service.string.message_numbers import Range
 from groundstation.survey.fusion.joint_angles import Pair, RestingYaw
 from groundstation.survey.fusion.shared_scale import shared_scale
 from groundstation.survey.fusion.survey_trust import Trust, trust_of
 from telemetry.application.seal_watch import CODE, refusal_of
 from telemetry.application.series import SERIES_SHIFT
-from telemetry.messages import EPOCH_UNKNOWN, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
+from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeMode, NodeState, SurveyMeasurement
 
 LOOK_EVERY = 0.5  # s, own clock
 DOUBTING_VAR = math.radians(5.0) ** 2  # rad^2, systematic, of a yaw that may have jumped
@@ -25,7 +28,7 @@ ASK_EVERY = 120.0  # s between two orders to send a range again
 ASKED_AT_MOST = 3
 REFUSALS = 3  # readings of the depth refused in a row until that is told
 SENSOR = NodeFlag.SENSOR_FAULT | NodeFlag.YAW_UNTRUSTED | NodeFlag.RATE_EXCEEDED
-AT_REST = (Mode.STILL, Mode.SURVEY)
+AT_REST = (NodeMode.STILL, NodeMode.SURVEY)
 OF_THE_DISK = ("saved_state_lost", "boot_counter_lost", "parameters_fallback")
 
 
@@ -41,21 +44,27 @@ class Gap:
 
 
 class Watch:
-    """Looks at a model and raises its alarms.
+    """Looks at what is known of a rig and raises its alarms.
 
     Parameters
     ----------
-    model : of the rig
+    string, hole, placement : that it looks at
+    alarms : that it raises
+    stale_after : s without a depth after which that is told
     """
 
-    def __init__(self, model: RigModel) -> None:
-        self._model = model
-        self._alarms = model.rig_alarms
+    def __init__(
+        self, string: KnownString, hole: SurveyedHole, placement: Placement, alarms: RigAlarms, stale_after: float
+    ) -> None:
+        self._string, self._hole, self._placement = string, hole, placement
+        self._time, self._states, self._alarms = string.time, string.states, alarms
+        self._numbers, self._joints, self._depths = string.numbers, string.joints, string.depths
+        self._stale_after = stale_after
         self._looked_at = -math.inf
         self._refused_in_a_row = 0
         self._contradictions = 0
         self._gaps: dict[int, Gap] = {}
-        self._witnesses = Witnesses()
+        self._cross_check = EncoderCrossCheck()
         self._told_unplaced: set[int] = set()  # tubes
         self._depth_due = math.inf  # s, own clock, since when tubes are known and a depth may be expected
 
@@ -66,7 +75,7 @@ class Watch:
     def look(self, now: float) -> None:
         """Look at everything, at ``now`` (s, own clock)."""
         self._looked_at = now
-        self._alarms.advance(now, self._model.rig_now)
+        self._alarms.advance(now, self._time.rig_now)
         self._look_at_nodes()
         self._look_at_encoder()
         self._look_at_belt()
@@ -81,7 +90,7 @@ class Watch:
         hold("tube_disk", tube, "its disk refuses" if NodeFlag.NOT_SAVED in state.flags else "")
         hold("clock", tube, self._clock_fault(state))
         self._look_at_joint(state)
-        if self._model.numbers.on_told(state.tube, state.numbered):
+        if self._numbers.on_told(state.tube, state.numbered):
             self._alarms.alert("tube_counts_anew", tube, f"newest number {state.numbered}")
 
     def on_event(self, event: Event) -> None:
@@ -97,7 +106,7 @@ class Watch:
         elif event.code == CODE:
             self._alarms.alert(CODE, tube, refusal_of(event.arguments))
         elif event.code == "joint_contradicts_marks":
-            angle, marks = (_number(event, name) for name in ("angle_deg", "marks_deg"))
+            angle, marks = (_event_number(event, name) for name in ("angle_deg", "marks_deg"))
             what = f"its angle by the yaws is {angle:.1f} deg, by its marks {marks:.1f} deg"
             self._alarms.alert("joint", f"joint above {tube}", f"{what}; see the command accept_joints")
 
@@ -106,20 +115,20 @@ class Watch:
 
         One that the disk refuses is judged each time it comes: its warning must not wait for room on a disk.
         """
-        if against := self._witnesses.on_event(event, self._heard):
+        if against := self._cross_check.on_event(event, self._heard):
             self._alarms.alert("reference", "encoder", against)
 
-    def on_survey(self, measurement: SurveyMeasurement, outcome: str) -> None:
-        """Tell what a survey was not used for: ``outcome`` is a kind of alarm, or empty.
+    def on_measurement(self, measurement: SurveyMeasurement, outcome: str) -> None:
+        """Tell what a measurement was not used for: ``outcome`` is a kind of alarm, or empty.
 
-        A tube whose surveys are all believed, for the last that was not is revised, is told of no longer.
+        A tube whose measurements are all believed, for the last that was not is revised, is told of no longer.
         """
         subject = f"tube {measurement.tube}"
         if outcome:
             flags = ", ".join(str(flag.name).lower() for flag in NodeFlag if flag and flag in measurement.flags)
             detail = f"number {measurement.sequence} at {measurement.station_at:.1f} s"
             self._alarms.alert(outcome, subject, f"{detail}: {flags}" if flags else detail)
-        elif self._alarms.stands(UNTRUSTED, subject) and not self._model.hole.has_untrusted(measurement.tube):
+        elif self._alarms.stands(UNTRUSTED, subject) and not self._hole.has_untrusted(measurement.tube):
             self._alarms.clear(UNTRUSTED, subject)
 
     def on_epoch(self, epoch: int) -> None:
@@ -129,12 +138,12 @@ class Watch:
     def on_depth(self, refused: str) -> None:
         """A reading of the depth was taken, or refused for a reason."""
         self._refused_in_a_row = self._refused_in_a_row + 1 if refused else 0
-        jumped = self._model.depths.jumped
+        jumped = self._depths.jumped
         if jumped:
             self._alarms.hold("depth_refused", "depth", f"it jumped {jumped}; see the command accept_depth")
         elif self._refused_in_a_row >= REFUSALS or not refused:
             self._alarms.hold("depth_refused", "depth", refused)
-        contradictions = self._model.depths.refusals[CONTRADICTION]
+        contradictions = self._depths.refusals[CONTRADICTION]
         if contradictions > self._contradictions:
             self._contradictions = contradictions
             self._alarms.alert("depth_refused", "stands", "stands of the bit contradict each other")
@@ -142,13 +151,13 @@ class Watch:
     def gaps_to_ask(self, now: float) -> list[tuple[int, Range]]:
         """Tubes and ranges that are to be asked for at ``now`` (s, own clock)."""
         asked = []
-        for tube in self._model.numbers.tubes:
+        for tube in self._numbers.tubes:
             gap = self._gap_of(tube, now)
             if gap is None or now < gap.found_at + GAP_AFTER or now < gap.asked_at + ASK_EVERY:
                 continue
             if gap.asked >= ASKED_AT_MOST:
                 self._give_up(tube, gap)
-            elif not self._model.is_stale(tube):
+            elif not self._states.is_stale(tube):
                 gap.asked_at, gap.asked = now, gap.asked + 1
                 asked.append((tube, gap.numbers))
         return asked
@@ -163,21 +172,20 @@ class Watch:
     @property
     def _heard(self) -> list[int]:
         """Tubes that are heard; all where none is, for what comes then is stored."""
-        tubes = self._model.tally.tubes
-        return [tube for tube in tubes if not self._model.is_stale(tube)] or tubes
+        return self._string.heard or self._string.tubes
 
     def _look_at_joint(self, state: NodeState) -> None:
         """Tell where the yaws of two neighbours part."""
         if state.mode not in AT_REST or trust_of(state.flags) is not Trust.FULL:
-            self._model.joints.on_motion(state.tube)
+            self._joints.on_motion(state.tube)
             return
         yaw = RestingYaw(state.tube, state.at, state.yaw, state.yaw_var)
-        if change := self._model.joints.on_yaw(self._model.tally.tubes, yaw):
+        if change := self._joints.on_yaw(self._string.tubes, yaw):
             what = f"the yaws part by {math.degrees(change.by):.1f} deg at {state.at:.0f} s"
             self._alarms.alert("joint", subject_of(change.pair), f"{what}; see the command accept_joints")
 
     def _gap_of(self, tube: int, now: float) -> Gap | None:
-        numbers, known = self._model.numbers.gap(tube), self._gaps.get(tube)
+        numbers, known = self._numbers.gap(tube), self._gaps.get(tube)
         if numbers is None:
             self._gaps.pop(tube, None)
             self._alarms.clear("numbers_missing", f"tube {tube}")
@@ -187,15 +195,15 @@ class Watch:
         known.numbers = numbers
         if now >= known.found_at + GAP_AFTER:
             self._alarms.hold("numbers_missing", f"tube {tube}", f"numbers {numbers[0]} to {numbers[1]}")
-            state = self._model.nodes.get(tube)
+            state = self._states.newest.get(tube)
             doubts = state is not None and state.systematic_var >= DOUBTING_VAR
-            if against := self._witnesses.on_lost(tube, numbers, self._heard, doubts=doubts):
+            if against := self._cross_check.on_lost(tube, numbers, self._heard, doubts=doubts):
                 self._alarms.alert("reference", "encoder", against)
         return known
 
     def _give_up(self, tube: int, gap: Gap) -> None:
         first, last = gap.numbers
-        self._model.numbers.give_up(tube, gap.numbers)
+        self._numbers.give_up(tube, gap.numbers)
         if first < gap.complete_from:
             what = f"numbers {first} to {last}; surveys may be among those before {gap.complete_from}"
         else:
@@ -203,30 +211,28 @@ class Watch:
         self._alarms.alert("numbers_lost", f"tube {tube}", what)
 
     def _clock_fault(self, state: NodeState) -> str:
-        model = self._model
-        if state.epoch not in (EPOCH_UNKNOWN, model.epoch):
-            return f"it counts from epoch {state.epoch}, the encoder from {model.epoch}"
-        if NodeFlag.CLOCK_UNSYNCHRONISED not in state.flags and state.at > model.rig_now + AHEAD:
-            return f"its rig time is {state.at - model.rig_now:.1f} s ahead"
+        time = self._time
+        if state.epoch not in (EPOCH_UNKNOWN, time.epoch):
+            return f"it counts from epoch {state.epoch}, the encoder from {time.epoch}"
+        if NodeFlag.CLOCK_UNSYNCHRONISED not in state.flags and state.at > time.rig_now + AHEAD:
+            return f"its rig time is {state.at - time.rig_now:.1f} s ahead"
         return ""
 
     def _look_at_nodes(self) -> None:
-        model = self._model
-        for tube in model.tally.tubes:
-            silent = "silent" if math.isfinite(model.age(tube)) else "not heard since the ground station started"
-            self._alarms.hold("tube_silent", f"tube {tube}", silent if model.is_stale(tube) else "")
+        for tube in self._string.tubes:
+            silent = "silent" if math.isfinite(self._states.age(tube)) else "not heard since the ground station started"
+            self._alarms.hold("tube_silent", f"tube {tube}", silent if self._states.is_stale(tube) else "")
 
     def _look_at_encoder(self) -> None:
-        model = self._model
-        if not model.knows_tubes:
-            return  # who ran all the while may not have been heard yet
-        lately = [tube for tube in model.tally.tubes if model.age(tube) <= OFF_BEFORE]
-        if unwatched := self._witnesses.look(model.epoch, model.rig_now, lately):
+        if not self._string.knows_tubes:
+            return  # a tube that ran all the while may not have been heard yet
+        lately = [tube for tube in self._string.tubes if self._states.age(tube) <= OFF_BEFORE]
+        if unwatched := self._cross_check.look(self._time.epoch, self._time.rig_now, lately):
             self._alarms.alert("reference", "encoder", unwatched)
 
     def _look_at_belt(self) -> None:
-        nodes = self._model.nodes
-        shared = shared_scale([nodes[tube].scale_factor for tube in self._model.tally.tubes if tube in nodes])
+        nodes = self._states.newest
+        shared = shared_scale([nodes[tube].scale_factor for tube in self._string.tubes if tube in nodes])
         if shared is None:
             self._alarms.hold("belt", "encoder", "")
             return
@@ -235,41 +241,41 @@ class Watch:
         self._alarms.hold("belt", "encoder", what)
 
     def _look_at_depth(self, now: float) -> None:
-        model = self._model
-        was_heard = math.isfinite(model.depth_heard_at)
-        if model.tally.tubes:
+        string, heard_at = self._string, self._string.depth_heard_at
+        was_heard = math.isfinite(heard_at)
+        if string.tubes:
             self._depth_due = min(self._depth_due, now)
-        silent = now > max(model.depth_heard_at, self._depth_due) + model.config.stale_after
+        silent = now > max(heard_at, self._depth_due) + self._stale_after
         why = "no reading comes" if was_heard else "not heard since the ground station started"
         self._alarms.hold("depth_silent", "depth", why if silent else "")
-        heard = [tube for tube in model.tally.tubes if not model.is_stale(tube)]
-        bit = model.depths.latest
-        comparable = was_heard and not silent and model.knows_tubes
-        misfit = model.tally.misfit(bit, heard) if bit is not None and comparable else ""
+        bit = string.bit
+        comparable = was_heard and not silent and string.knows_tubes
+        misfit = string.tally.misfit(bit, string.heard) if bit is not None and comparable else ""
         self._alarms.hold("depth_contradicts", "depth", misfit)
 
     def _look_at_surveys(self) -> None:
-        model = self._model
+        time, waiting = self._time, self._placement.waiting
         overdue: dict[int, list[int]] = {}
-        for one in model.waiting:
-            m = one.measurement
-            if m.epoch not in (EPOCH_UNKNOWN, model.epoch) or model.rig_now > m.station_at + PLACED_WITHIN:
+        for one in waiting:
+            m = one.message
+            if m.epoch not in (EPOCH_UNKNOWN, time.epoch) or time.rig_now > m.station_at + PLACED_WITHIN:
                 overdue.setdefault(m.tube, []).append(m.sequence)
-        for tube in {one.measurement.tube for one in model.waiting} | self._told_unplaced:
+        for tube in {one.message.tube for one in waiting} | self._told_unplaced:
             numbers = ", ".join(map(str, overdue.get(tube, [])[:10]))
             self._alarms.hold("survey_unplaced", f"tube {tube}", f"numbers {numbers}" if numbers else "")
         self._told_unplaced = set(overdue)
 
     def _look_at_stops(self) -> None:
-        self._model.stops.judge(self._model.epoch, self._model.rig_now)
-        for stop in self._model.stops:
+        stops = self._string.stops
+        stops.judge(self._time.epoch, self._time.rig_now)
+        for stop in stops:
             if stop.judged:
                 missing = ", ".join(map(str, sorted(stop.missing)))
                 subject = f"stop at {stop.stand.md:.2f} m, {stop.stand.epoch}/{stop.stand.begun_at:.0f} s"
                 self._alarms.hold("survey_missing", subject, f"tubes {missing}" if missing else "")
 
 
-def _number(event: Event, name: str) -> float:
+def _event_number(event: Event, name: str) -> float:
     """An argument of an event as a float; NaN if it is missing or no number, for the event may be forged."""
     value = event.arguments.get(name)
     return float(value) if isinstance(value, int | float) else math.nan

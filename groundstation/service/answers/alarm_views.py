@@ -6,7 +6,7 @@ import math
 
 from groundstation.service.alarms.crew_alarms import HOUR, CrewAlarm, CrewAlarms
 from groundstation.service.alarms.rig_alarms import RigAlarm
-from groundstation.service.alarms.verdict import wind
+from groundstation.service.alarms.verdict import compass_point
 from groundstation.service.answers.answer_texts import finite_or_none, utc_or_none
 from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
@@ -18,8 +18,8 @@ from groundstation.service.answers.shapes.alarm_shapes import (
     ToleranceAlarmRow,
 )
 from groundstation.service.answers.streamed_rows import Parameters
-from groundstation.service.hole.deviation_alarms import Alarm as DeviationAlarm
-from groundstation.service.hole.surveyed_hole import Moved
+from groundstation.service.hole.deviation_alarms import DeviationAlarm
+from groundstation.service.hole.movement import Moved
 from groundstation.survey.wall.column_deviation import LEVELS
 
 
@@ -93,7 +93,7 @@ def crew_alarm_row(crew: CrewAlarms, a: CrewAlarm) -> Alarm:
         threshold=what.threshold,
         md_m=None if what.md is None else round(what.md, 2),
         azimuth_deg=None if what.direction is None else round(math.degrees(what.direction)) % 360,
-        wind=None if what.direction is None else wind(what.direction),
+        wind=None if what.direction is None else compass_point(what.direction),
         since_s=finite_or_none(a.since),
         since_utc=utc_or_none(a.since_utc),
         times=a.times,

@@ -94,10 +94,10 @@ def _points(text: str | None) -> int:
 
 
 def _dominant(k: RigModel) -> DominantAngle | None:
-    leaning = [station for station in k.stations if station.md > 0.0]
+    leaning = [station for station in k.hole.stations if station.md > 0.0]
     if not leaning:
         return None
-    found = lateral_errors(k.fused(leaning[-1]), k.hole.trajectory[-1].md)
+    found = lateral_errors(k.hole.direction_of(leaning[-1]), k.hole.trajectory[-1].md)
     return DominantAngle(found.name, found.by_inclination, found.by_azimuth)
 
 

@@ -27,7 +27,7 @@ from groundstation.service.answers.shapes.hole_shapes import (
 )
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.hole.station import SurveyStation
-from groundstation.service.hole.surveyed_hole import Hole
+from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.survey.fusion.resolve import angle_stds_of_all, direction_angles
 from groundstation.survey.fusion.shared import KIND_NAMES
 from groundstation.survey.well.ellipsoid import Ellipse, coverage_radius, ellipsoid_axes, plan_ellipses
@@ -44,10 +44,10 @@ SOURCES = ("random", *KIND_NAMES)
 def answer_stations(k: RigModel, p: Parameters) -> StationsAnswer:
     """All stations, fused; ``md`` selects."""
     wanted = SelectorRange.of_parameter("md", p)
-    return StationsAnswer(station_rows(k, [n for n, s in enumerate(k.stations, 1) if wanted.holds(s.md)]))
+    return StationsAnswer(station_rows(k, [n for n, s in enumerate(k.hole.stations, 1) if wanted.holds(s.md)]))
 
 
-@member_view_of(Station, lambda k: range(1, len(k.stations) + 1))
+@member_view_of(Station, lambda k: range(1, len(k.hole.stations) + 1))
 def answer_station(k: RigModel, n: int) -> Station:
     """One station, fused; ``n`` from 1."""
     return station_rows(k, [n])[0]
@@ -58,7 +58,7 @@ def station_rows(k: RigModel, numbers: Sequence[int]) -> list[Station]:
 
     What a string turns by in a bent hole changes with the stations around.
     """
-    known, hole = k.stations, k.hole
+    known, hole = k.hole.stations, k.hole
     chosen, drawn = [known[n - 1] for n in numbers], hole.trajectory
     changed = chosen if hole.has_transport else [s for s in chosen if s.shown is None]
     for s, values in zip(changed, direction_values(hole, changed), strict=True):
@@ -71,7 +71,7 @@ def station_rows(k: RigModel, numbers: Sequence[int]) -> list[Station]:
     )
 
 
-def direction_values(hole: Hole, chosen: Sequence[SurveyStation]) -> list[Values]:
+def direction_values(hole: SurveyedHole, chosen: Sequence[SurveyStation]) -> list[Values]:
     """Directions of stations and what each is made of."""
     if not chosen:
         return []

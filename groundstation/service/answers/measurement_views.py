@@ -26,7 +26,7 @@ from groundstation.service.answers.shapes.hole_shapes import (
 )
 from groundstation.service.answers.streamed_rows import Parameters, is_streamed, window_limits
 from groundstation.service.answers.string_views import flag_names
-from groundstation.service.hole.resolved_stops import NO_NUMBER, Table, forces_of
+from groundstation.service.hole.resolved_stops import NO_NUMBER, ResolvedStops, forces_of
 from groundstation.survey.fusion.resolve import Quality, angle_stds_of_all, direction_angles
 from groundstation.survey.fusion.survey_trust import Trust
 from telemetry.messages import NodeFlag
@@ -40,38 +40,38 @@ def answer_measurements_text(k: RigModel, p: Parameters) -> bytes:
 
     A row shows something else once it is revised, or a station comes above its own.
     """
-    surveys, newest = k.hole.surveys, k.seen["measurements"]
+    surveys, newest = k.hole.stops, k.hole.newest
     rows, stations = _selected(k, p)
 
     def render(places: Numbers) -> list[MeasurementRow]:
         return measurement_rows(surveys, rows[places].tolist(), stations[places].tolist())
 
-    texts = k.measurement_texts.texts_of(rows, np.stack([surveys.column("number")[rows], stations], axis=1), render)
+    texts = k.texts.measurements.texts_of(rows, np.stack([surveys.column("number")[rows], stations], axis=1), render)
     return json_of(MeasurementsAnswer(newest, listed_texts(texts)))
 
 
 @view_of(MeasurementsAnswer, answer_measurements_text)
 def answer_measurements(k: RigModel, p: Parameters) -> MeasurementsAnswer:
     """Every cluster; ``station`` and ``tube`` select, ``since`` and ``limit`` give them as they came."""
-    surveys, newest = k.hole.surveys, k.seen["measurements"]
+    surveys, newest = k.hole.stops, k.hole.newest
     rows, stations = _selected(k, p)
     return MeasurementsAnswer(newest, measurement_rows(surveys, rows.tolist(), stations.tolist()))
 
 
-@member_view_of(StationMeasurementsAnswer, lambda k: range(1, len(k.stations) + 1))
+@member_view_of(StationMeasurementsAnswer, lambda k: range(1, len(k.hole.stations) + 1))
 def answer_station_measurements(k: RigModel, n: int) -> StationMeasurementsAnswer:
     """Every cluster of one station."""
-    surveys, rows = k.hole.surveys, k.stations[n - 1].clusters.table_rows.tolist()
+    surveys, rows = k.hole.stops, k.hole.stations[n - 1].stops.table_rows.tolist()
     return StationMeasurementsAnswer(n, measurement_rows(surveys, rows, [n] * len(rows)))
 
 
 def _selected(k: RigModel, p: Parameters) -> tuple[Numbers, Numbers]:
     """Rows (n,) of the table that the parameters select, and the numbers of their stations."""
-    known, table, newest = k.stations, k.hole.surveys, k.seen["measurements"]
+    known, table, newest = k.hole.stations, k.hole.stops, k.hole.newest
     since, limit = window_limits(newest, p) if is_streamed(p) else (0, None)
     by_station = SelectorRange.of_parameter("station", p)
     chosen = [(n, one) for n, one in enumerate(known, 1) if by_station.holds(n)]
-    rows = np.concatenate([NO_ROWS, *(one.clusters.table_rows for _, one in chosen)])
+    rows = np.concatenate([NO_ROWS, *(one.stops.table_rows for _, one in chosen)])
     stations = np.repeat([n for n, _ in chosen], [one.count for _, one in chosen]).astype(np.int64)
     keeps = table.column("number")[rows] > since
     if "tube" in p:
@@ -84,7 +84,7 @@ def _selected(k: RigModel, p: Parameters) -> tuple[Numbers, Numbers]:
     return rows, stations
 
 
-def measurement_rows(surveys: Table, rows: Sequence[int], stations: Sequence[int]) -> list[MeasurementRow]:
+def measurement_rows(surveys: ResolvedStops, rows: Sequence[int], stations: Sequence[int]) -> list[MeasurementRow]:
     """Surveys in some rows of the table, each resolved and with the number of its station."""
     if not rows:
         return []

@@ -8,7 +8,7 @@ from groundstation.service.answers.answer_views import member_view_of, view_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.shapes.order_shapes import Order, OrdersAnswer
 from groundstation.service.answers.streamed_rows import Parameters
-from groundstation.service.orders.order_book import Order as SentOrder
+from groundstation.service.orders.order_book import SentOrder
 from telemetry.application.arguments import shown_values
 
 

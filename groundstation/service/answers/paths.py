@@ -66,7 +66,7 @@ class AnsweredPath:
         if (text_of := MAKERS[self.answer.shape].text) is not None:
             text = text_of(k, p)
         elif self.answer.of_the_hole and not p:
-            text = k.last_shown(self.answer.path, lambda: json_of(self.view(k, p)))
+            text = k.texts.text_of(self.answer.path, lambda: json_of(self.view(k, p)))
         else:
             text = json_of(self.view(k, p))
         return json_of(answer_header(k))[:-1] + b"," + text[1:]
@@ -93,7 +93,7 @@ class AnsweredPath:
 
 def answer_header(k: RigModel) -> AnswerHeader:
     """What every answer begins with."""
-    return AnswerHeader(k.revision, utc_text(time.time()), finite_or_none(k.rig_now))
+    return AnswerHeader(k.revisions.newest, utc_text(time.time()), finite_or_none(k.string.time.rig_now))
 
 
 @view_of(SchemaAnswer)

@@ -28,46 +28,46 @@ from telemetry.messages import Event, NodeFlag, NodeState, StaticRecord
 @view_of(StatusAnswer)
 def answer_status(k: RigModel, _p: Parameters) -> StatusAnswer:
     """Rig time, depth, counts, health."""
-    tubes, stations = k.tally.tubes, k.stations
+    string, stations = k.string, k.hole.stations
     return StatusAnswer(
         rig=k.config.rig,
-        bit_md_m=k.depths.latest,
-        tubes=len(tubes),
-        stale_tubes=[tube for tube in tubes if k.is_stale(tube)],
+        bit_md_m=string.bit,
+        tubes=len(string.tubes),
+        stale_tubes=string.silent,
         stations=len(stations),
         measurements=sum(s.count for s in stations),
-        unplaced_measurements=k.unplaced,
-        refused_measurements=k.refused,
-        set_aside_measurements=len(k.set_aside),
+        unplaced_measurements=k.placement.unplaced,
+        refused_measurements=k.placement.refused,
+        set_aside_measurements=len(k.placement.set_aside),
         untrusted_measurements=sum(s.untrusted for s in stations),
-        health=k.health.name.lower(),
-        epoch=k.epoch,
+        health=k.rig_alarms.health_of(is_known=string.is_known).name.lower(),
+        epoch=string.time.epoch,
         alarms=sorted({alarm.kind.code for alarm in k.rig_alarms}),
     )
 
 
 @view_of(ChangesAnswer)
 def answer_changes(k: RigModel, _p: Parameters) -> ChangesAnswer:
-    """Revision at which each path changed last: a client with an older answer has missed a change."""
-    return ChangesAnswer([PathChange(path, at) for path, at in sorted(k.changed_at.items())])
+    """When each path changed last: a listener that holds an answer of before has missed one."""
+    return ChangesAnswer([PathChange(path, at) for path, at in sorted(k.revisions.changed_at.items())])
 
 
 @view_of(StringAnswer)
 def answer_string(k: RigModel, _p: Parameters) -> StringAnswer:
     """Tubes from top to bottom."""
-    tally, bit = k.tally, k.depths.latest
-    rows = []
-    for tube in tally.tubes:
-        below = tally.length_below(tube)
-        md = None if bit is None or below is None else round(bit - below, 6)
-        rows.append(StringTube(tube, md, finite_or_none(k.age(tube)), k.is_stale(tube)))
+    string, states, rows = k.string, k.string.states, []
+    for tube in string.tubes:
+        md = string.depth_of_node(tube)
+        shown_md = None if md is None else round(md, 6)
+        rows.append(StringTube(tube, shown_md, finite_or_none(states.age(tube)), states.is_stale(tube)))
     return StringAnswer(rows)
 
 
-@member_view_of(NodeAnswer, lambda k: sorted(k.nodes))
+@member_view_of(NodeAnswer, lambda k: sorted(k.string.states.newest))
 def answer_node(k: RigModel, tube: int) -> NodeAnswer:
     """Last state of one node."""
-    s, age, is_stale = k.nodes[tube], k.age(tube), k.is_stale(tube)
+    states = k.string.states
+    s, age, is_stale = states.newest[tube], states.age(tube), states.is_stale(tube)
     return NodeAnswer(
         tube=tube,
         at_s=s.at,
@@ -104,10 +104,10 @@ def mount_offset(s: NodeState) -> MountOffset | None:
 @view_of(EventsAnswer)
 def answer_events(k: RigModel, p: Parameters) -> EventsAnswer:
     """What happened; ``tube`` selects."""
-    known, newest = k.events, k.seen["events"]
+    events = k.string.events
     wanted = SelectorRange.of_parameter("tube", p)
-    rows = [event_row(e, n) for n, e in enumerate(known, newest - len(known) + 1) if wanted.holds(e.tube)]
-    return EventsAnswer(newest, select_rows(rows, newest, p))
+    rows = [event_row(e, n) for n, e in events.numbered() if wanted.holds(e.tube)]
+    return EventsAnswer(events.newest, select_rows(rows, events.newest, p))
 
 
 def event_row(e: Event, seq: int) -> EventRow:
@@ -126,10 +126,10 @@ def event_row(e: Event, seq: int) -> EventRow:
 @view_of(StaticRecordsAnswer)
 def answer_static_records(k: RigModel, p: Parameters) -> StaticRecordsAnswer:
     """Raw readings averaged at rest; ``tube`` selects."""
-    known, newest = k.static_records, k.seen["static_records"]
+    records = k.string.static_records
     wanted = SelectorRange.of_parameter("tube", p)
-    rows = [static_record_row(r, n) for n, r in enumerate(known, newest - len(known) + 1) if wanted.holds(r.tube)]
-    return StaticRecordsAnswer(newest, select_rows(rows, newest, p))
+    rows = [static_record_row(r, n) for n, r in records.numbered() if wanted.holds(r.tube)]
+    return StaticRecordsAnswer(records.newest, select_rows(rows, records.newest, p))
 
 
 def static_record_row(r: StaticRecord, seq: int) -> StaticRecordRow:

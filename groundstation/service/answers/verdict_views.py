@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import math
 
-from groundstation.service.alarms.verdict import Verdict as HoleVerdict
-from groundstation.service.alarms.verdict import Word, direction, judge, wind
+from groundstation.service.alarms.verdict import (
+    FINEST_CM,
+    HoleVerdict,
+    Word,
+    compass_point,
+    deviation_azimuth,
+    judge_hole,
+)
 from groundstation.service.alarms.verdict_doubts import known_of
 from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
@@ -15,7 +21,6 @@ from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.survey.wall.column_deviation import Deviation
 
 CM = 100.0
-FINEST_CM = 0.1  # cm, of a line for a screen
 PHRASES = {
     Word.ON_TARGET: "ON TARGET",
     Word.WATCH: "WATCH",
@@ -28,8 +33,8 @@ PHRASES = {
 @view_of(Verdict)
 def answer_verdict(k: RigModel, _p: Parameters) -> Verdict:
     """The verdict of this moment."""
-    rig, good_for, known = k.config.rig, k.config.stale_after, known_of(k)
-    found = judge(known)
+    rig, good_for, known = k.config.rig, k.config.stale_after, known_of(k.config, k.string, k.hole, k.rig_alarms)
+    found = judge_hole(known)
     way = None if found.about is None or found.act_before is None else steering_view(found.about, found)
     return Verdict(
         rig=rig,
@@ -56,17 +61,17 @@ def off_target_view(d: Deviation) -> Off:
         sigma_cm=rounded_std(CM * d.std),
         limit_cm=round(CM * d.limit, 1),
         used_percent=round(100.0 * d.ratio) if math.isfinite(d.ratio) else None,
-        azimuth_deg=round(math.degrees(direction(d))) % 360,
-        wind=wind(direction(d)),
+        azimuth_deg=round(math.degrees(deviation_azimuth(d))) % 360,
+        wind=compass_point(deviation_azimuth(d)),
     )
 
 
 def steering_view(d: Deviation, found: HoleVerdict) -> Steer:
     """Where to, and until when."""
-    back = direction(d) + math.pi
+    back = deviation_azimuth(d) + math.pi
     return Steer(
         azimuth_deg=round(math.degrees(back)) % 360,
-        wind=wind(back),
+        wind=compass_point(back),
         before_md_m=None if found.act_before is None else round(found.act_before, 1),
         left_m=None if found.left is None else round(found.left, 1),
     )
@@ -83,8 +88,8 @@ def verdict_line(found: HoleVerdict) -> str:
     size = round_to_std(CM * d.size, spread) if spread >= 1.0 else CM * d.size  # rounded once, as it is written
     is_end = found.what == "projection"
     where = "ends" if is_end else f"at {d.md:.1f} m"
-    said = f"{phrase}: {where} {size:.1f} ± {spread:.1f} cm at {round(math.degrees(direction(d))) % 360} deg"
-    said += f" {wind(direction(d))}; limit {CM * d.limit:.0f} ({100.0 * d.ratio:.0f} %)"
+    said = f"{phrase}: {where} {size:.1f} ± {spread:.1f} cm at {round(math.degrees(deviation_azimuth(d))) % 360} deg"
+    said += f" {compass_point(deviation_azimuth(d))}; limit {CM * d.limit:.0f} ({100.0 * d.ratio:.0f} %)"
     if found.act_before is None or found.left is None or found.word is Word.OUT:
         return said
     return f"{said}; act " + (f"before {found.act_before:.1f} m" if found.left > 0.0 else "at once")

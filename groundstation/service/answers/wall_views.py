@@ -31,12 +31,12 @@ def answer_wall(k: RigModel, _p: Parameters) -> WallAnswer:
     live = k.wall
     if live is None:
         return WallAnswer(None)
-    return WallAnswer(wall_neighbourhood(live, live.judged(stations_of(k), k.depths.latest)))
+    return WallAnswer(wall_neighbourhood(live, live.judged(stations_of(k), k.string.bit)))
 
 
 def stations_of(k: RigModel) -> list[tuple[float, float, float]]:
     """Measured depth (m), inclination and azimuth (rad) of the stations below the collar."""
-    found = [(station.md, k.fused(station)) for station in k.stations if station.md > 0.0]
+    found = [(station.md, k.hole.direction_of(station)) for station in k.hole.stations if station.md > 0.0]
     return [(md, *direction_angles(direction.lean, direction.down)) for md, direction in found]
 
 

@@ -32,14 +32,14 @@ def alarm_of_text(text: str) -> CrewAlarm:
     """
     try:
         data = json.loads(text)
-        condition = _checked(Condition, data.pop("condition") | {})
-        alarm: CrewAlarm = _checked(CrewAlarm, data | {"condition": condition})
+        condition = _checked_fields(Condition, data.pop("condition") | {})
+        alarm: CrewAlarm = _checked_fields(CrewAlarm, data | {"condition": condition})
     except (ValueError, TypeError, AttributeError, KeyError) as error:
         raise DamagedAlarmError(f"expected an alarm, got {text!r:.40}") from error
     return alarm
 
 
-def _checked(kind: type[Any], data: dict[str, Any]) -> Any:
+def _checked_fields(kind: type[Any], data: dict[str, Any]) -> Any:
     """A dataclass whose values have the types of its fields."""
     known = {field.name: str(field.type) for field in fields(kind)}
     values = {}

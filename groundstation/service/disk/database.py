@@ -131,7 +131,7 @@ class Database:
         """Make ready for writing and count this start; a database of ours that refuses is read all the same."""
         if self._engine.dialect.name == "sqlite":
             self._engine.dispose()  # the connection that only looked is not durable
-            sa.event.listen(self._engine, "connect", _durable)
+            sa.event.listen(self._engine, "connect", _make_durable)
         self._tables = set(tables)
         try:
             with self._refusing():
@@ -168,7 +168,7 @@ def _engine_of(url: str, disk: Disk) -> sa.Engine:
 
 def _engine_of_file(address: sa.URL, disk: Disk) -> sa.Engine:
     """Engine of a file: statements are compiled once a process for all of them, which costs more than a whole start."""
-    file, dialect = Path(address.database or ""), _sqlite()
+    file, dialect = Path(address.database or ""), _sqlite_dialect()
 
     def connect() -> Any:
         return disk.connect(file)
@@ -178,7 +178,7 @@ def _engine_of_file(address: sa.URL, disk: Disk) -> sa.Engine:
 
 
 @functools.cache
-def _sqlite() -> sa.Dialect:
+def _sqlite_dialect() -> sa.Dialect:
     """SQLAlchemy's dialect of SQLite, which has seen a connection."""
     engine = sa.create_engine("sqlite://")
     engine.connect().close()
@@ -186,7 +186,7 @@ def _sqlite() -> sa.Dialect:
     return engine.dialect
 
 
-def _durable(connection: sa.engine.interfaces.DBAPIConnection, _record: object) -> None:
+def _make_durable(connection: sa.engine.interfaces.DBAPIConnection, _record: object) -> None:
     cursor = connection.cursor()
     with contextlib.suppress(sqlite3.OperationalError):  # a file that cannot be written can be read
         cursor.execute("PRAGMA journal_mode=WAL")

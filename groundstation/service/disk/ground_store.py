@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import sqlalchemy as sa
@@ -43,25 +42,17 @@ from groundstation.service.disk.database_tables import (
     WHOLE_STRING,
     add_new,
 )
-from groundstation.service.string.depth import NEVER, Doubt, Instant
+from groundstation.service.string.depth import NEVER, DepthDoubt, Instant
+from groundstation.service.string.stored import Stored
 from groundstation.survey.fusion.joint_angles import JointAngle, Pair
 from telemetry.errors import DecodeError
 from telemetry.messages import Event, Kept, Stand, StaticRecord, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, unpack_block
 from telemetry.presentation.content import content_of
-from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.presentation.msgpack_codec import decode_message, encode_message
 from telemetry.runtime.disk import MACHINE, Disk
 
 ALARMS_KEPT = 1000
-
-
-@dataclass(frozen=True, slots=True)
-class Stored:
-    """A message from the store, the depth (m) it was measured at and the string (m) below its tube, if known."""
-
-    message: Kept
-    md: float | None
-    below: float | None = None
 
 
 class Store(Database):
@@ -80,7 +71,7 @@ class Store(Database):
         """Store one message, see ``add_messages``."""
         return self.add_messages([Stored(message, md, below)])[0]
 
-    def add_messages(self, arrived: Sequence[Stored]) -> list[bool]:
+    def add_messages(self, arrived: Sequence[Stored[Kept]]) -> list[bool]:
         """Store messages, all or none; durable on return. False for each that was already there.
 
         Raises
@@ -92,8 +83,8 @@ class Store(Database):
             return [self._add(connection, one) for one in arrived]
 
     @staticmethod
-    def _add(connection: sa.Connection, one: Stored) -> bool:
-        payload = encode(one.message)
+    def _add(connection: sa.Connection, one: Stored[Kept]) -> bool:
+        payload = encode_message(one.message)
         same = row_of(one.message, payload)
         kind = type(one.message).__name__
         row = {**same, "kind": kind, "md": one.md, "below": one.below, "payload": payload}
@@ -110,7 +101,7 @@ class Store(Database):
         """Store the depths (m) of messages that came earlier, or take them back (None): all or none."""
         rows = []
         for message, md in placed:
-            row = row_of(message, encode(message))
+            row = row_of(message, encode_message(message))
             rows.append({"depth": md, **{f"its_{name}": value for name, value in row.items()}})
         with self._writing() as connection:
             connection.execute(PLACE, rows)
@@ -123,12 +114,12 @@ class Store(Database):
             row = {"epoch": stand.epoch, "begun_at": stand.begun_at, "ended_at": stand.ended_at, "md": stand.md}
             connection.execute(ADD_STAND, row)
 
-    def messages(self) -> Iterator[Stored]:
+    def messages(self) -> Iterator[Stored[Kept]]:
         """Everything stored, in the order of arrival; what is damaged is passed over and counted."""
         with self._refusing(), self._engine.connect() as connection:
             for payload, md, below in connection.execute(ALL_MESSAGES):
                 try:
-                    message = decode(payload)
+                    message = decode_message(payload)
                 except DecodeError:
                     self.damaged += 1
                     continue
@@ -147,23 +138,23 @@ class Store(Database):
         with self._writing() as connection:
             self._replace_meta(connection, {"epoch": str(epoch)})
 
-    def keep_depth_doubt(self, doubt: Doubt) -> None:
+    def keep_depth_doubt(self, doubt: DepthDoubt) -> None:
         """Store since when depths are refused, when the crew accepted one, and of which times none is believed."""
-        values = {"depth_accepted": _numbers(*doubt.accepted)}
+        values = {"depth_accepted": _join_numbers(*doubt.accepted)}
         if doubt.trusted is not None:
-            values["depth_trusted"] = _numbers(*doubt.trusted)
+            values["depth_trusted"] = _join_numbers(*doubt.trusted)
         if doubt.times:
             values["depth_doubted"] = "; ".join(map(_stand_text, doubt.times))
         with self._writing() as connection:
             self._replace_meta(connection, values, without=["depth_trusted", "depth_doubted"])
 
-    def depth_doubt(self) -> Doubt:
+    def depth_doubt(self) -> DepthDoubt:
         """What was kept last of what is doubtful of the depth."""
         with self._refusing():
             meta = self._meta()
         trusted, accepted, times = (meta.get(f"depth_{name}") for name in ("trusted", "accepted", "doubted"))
         try:
-            return Doubt(
+            return DepthDoubt(
                 None if trusted is None else _reading_of(trusted),
                 NEVER if accepted is None else _instant_of(accepted),
                 () if times is None else tuple(map(_stand_of, times.split(";"))),
@@ -260,12 +251,12 @@ class Store(Database):
         return found
 
 
-def _numbers(*values: float) -> str:
+def _join_numbers(*values: float) -> str:
     return " ".join(map(repr, values))
 
 
 def _stand_text(stand: Stand) -> str:
-    return _numbers(stand.epoch, stand.begun_at, stand.ended_at, stand.md)
+    return _join_numbers(stand.epoch, stand.begun_at, stand.ended_at, stand.md)
 
 
 def _reading_of(text: str) -> tuple[int, float, float]:

@@ -16,7 +16,7 @@ CLEARED_BELOW = 0.02  # of the tolerance, under a level
 
 
 @dataclass(frozen=True, slots=True)
-class Alarm:
+class DeviationAlarm:
     """One level of one kind."""
 
     kind: str  # deviation or projection
@@ -34,24 +34,29 @@ class AlarmList:
     """Every alarm raised so far."""
 
     def __init__(self) -> None:
-        self.alarms: list[Alarm] = []
+        self.alarms: list[DeviationAlarm] = []
 
     @property
-    def active(self) -> list[Alarm]:
+    def active(self) -> list[DeviationAlarm]:
         """Alarms not cleared."""
         return [alarm for alarm in self.alarms if alarm.cleared_at is None]
 
     def judge_deviation(self, kind: str, deviation: Deviation, at: float) -> bool:
         """Raise and clear by a new deviation at rig time ``at`` (s); whether anything changed."""
-        changed = False
+        ratio, changed, standing = deviation.ratio, False, dict[float, int]()
+        for place, alarm in enumerate(self.alarms):
+            if alarm.kind == kind and alarm.cleared_at is None:
+                standing[alarm.level] = place
         for level in LEVELS:
-            standing = next((a for a in self.active if (a.kind, a.level) == (kind, level)), None)
-            if standing is None and deviation.ratio >= level:
+            known = standing.get(level)
+            if known is None and ratio >= level:
                 direction = math.atan2(deviation.offset[1], deviation.offset[0]) % math.tau
-                new = Alarm(kind, level, at, deviation.md, deviation.size, deviation.std, deviation.limit, direction)
+                new = DeviationAlarm(
+                    kind, level, at, deviation.md, deviation.size, deviation.std, deviation.limit, direction
+                )
                 self.alarms.append(new)
                 changed = True
-            elif standing is not None and deviation.ratio < level - CLEARED_BELOW:
-                self.alarms[self.alarms.index(standing)] = replace(standing, cleared_at=at)
+            elif known is not None and ratio < level - CLEARED_BELOW:
+                self.alarms[known] = replace(self.alarms[known], cleared_at=at)
                 changed = True
         return changed

@@ -39,10 +39,10 @@ def block_of_files(folder: Path, tube: int, version: int, gyroscope: str, accele
     CalibrationError
         When a name is invalid, or its file holds no calibration or that of another sensor.
     """
-    return block_of(tube, version, _read(folder, gyroscope), _read(folder, accelerometer))
+    return block_of(tube, version, _read_block_file(folder, gyroscope), _read_block_file(folder, accelerometer))
 
 
-def _read(folder: Path, name: str) -> Calibration | None:
+def _read_block_file(folder: Path, name: str) -> Calibration | None:
     if not NAME.fullmatch(name):
         raise CalibrationError(f"expected the name of a file below {folder} without its .json, got {name!r:.80}")
     return None if name == IDENTITY else read_calibration(folder / f"{name}.json")

@@ -30,7 +30,7 @@ class OrderState(enum.StrEnum):
 
 
 @dataclass(slots=True)
-class Order:
+class SentOrder:
     """One order.
 
     ``tube`` is None for an order to the ground station. ``answered`` means that its sender can have an
@@ -81,17 +81,17 @@ class OrderBook:
     """Orders by their number, the oldest first; ``changed`` names those that changed since they were last drained."""
 
     def __init__(self) -> None:
-        self._orders: OrderedDict[int, Order] = OrderedDict()
+        self._orders: OrderedDict[int, SentOrder] = OrderedDict()
         self._changed: dict[int, None] = {}
 
-    def __iter__(self) -> Iterator[Order]:
+    def __iter__(self) -> Iterator[SentOrder]:
         return iter(self._orders.values())
 
-    def get(self, number: int) -> Order | None:
+    def get(self, number: int) -> SentOrder | None:
         """Order of a number, None for one that is not known any more."""
         return self._orders.get(number)
 
-    def add(self, order: Order) -> None:
+    def add(self, order: SentOrder) -> None:
         """Keep a new order; the oldest that ended makes room."""
         self._orders[order.number] = order
         self._changed[order.number] = None
@@ -161,6 +161,6 @@ class OrderBook:
                 if order.tube == event.tube and order.spec.goes_on and order.state is OrderState.ACKNOWLEDGED:
                     self.fail(order.number, "nothing was recorded")
 
-    def _advance(self, order: Order, state: OrderState, detail: str, *, answered: bool = True) -> None:
+    def _advance(self, order: SentOrder, state: OrderState, detail: str, *, answered: bool = True) -> None:
         self._changed[order.number] = None
         order.advance(state, detail, answered=answered)

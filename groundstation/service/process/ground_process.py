@@ -12,21 +12,20 @@ from typing import TYPE_CHECKING, Protocol
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
 from groundstation.service.alarms.conditions import conditions_of
-from groundstation.service.alarms.crew_alarms import Times
+from groundstation.service.alarms.crew_alarms import Condition, Times
 from groundstation.service.alarms.watch import Watch
 from groundstation.service.answers.model import RigModel
+from groundstation.service.answers.revisions import BEATS
 from groundstation.service.disk.ground_store import Store
-from groundstation.service.disk.keeper import Keeper, refusing_disk
-from groundstation.service.orders.order_book import Order
+from groundstation.service.disk.keeper import StringKeeper, refusing_disk
+from groundstation.service.orders.order_book import SentOrder
 from groundstation.service.orders.uploads import Uploads
 from groundstation.service.process.intake_tape import DEPTH, MESSAGE, ORDER, TIMER, Tape
 from groundstation.service.process.learner import Learner
-from groundstation.service.process.operator_access import BlockUpload, Operator, Outgoing
-from groundstation.service.string.stands import take_stand
+from groundstation.service.process.operator_access import BlockUpload, OperatorAccess, Outgoing
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seal_watch import SealWatch, refusal_of
 from telemetry.errors import DecodeError
-from telemetry.frozen import replace
 from telemetry.messages import (
     BASE,
     EPOCH_UNKNOWN,
@@ -42,7 +41,7 @@ from telemetry.messages import (
     StaticRecord,
     SurveyMeasurement,
 )
-from telemetry.presentation.msgpack_codec import decode
+from telemetry.presentation.msgpack_codec import decode_message
 from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.process_interface import Process
 from telemetry.transport.authentication import read_key
@@ -53,7 +52,6 @@ if TYPE_CHECKING:
 
 STARTS = 1 << 31  # numbers of a start by lot
 HEARTBEAT = 1.0  # s, own clock, between two verdicts
-BEATS = ("verdict", "changes")  # paths that are published without end
 EARLY = 64  # readings of the depth that may come before rig time is known
 GROUND_STATION = "ground station"  # who orders that something be sent again
 
@@ -108,8 +106,9 @@ class GroundProcess(Process):
         self.store = Store(config.url, disk)
         # by lot, not counted: a database that was deleted or restored must not repeat a number that the string has seen
         start = 1 + lot(STARTS)
-        self.model = RigModel(config)
-        self.watch = Watch(self.model)
+        self.model = model = RigModel.begin(config)
+        self._string = model.string
+        self.watch = Watch(model.string, model.hole, model.placement, model.rig_alarms, config.stale_after)
         self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=start, seals=seals)
         self._seal_watch = SealWatch(self.endpoint, self._on_refused)
         self.clock: RigClock = self.endpoint.clock
@@ -120,18 +119,18 @@ class GroundProcess(Process):
         self._early: deque[DepthReading] = deque(maxlen=EARLY)
         self._beat_at = -math.inf
         self._plane = -1  # of the wall, that the bit has passed last
-        self._keeper = Keeper(self.store, self.model)
-        self._learner = Learner(self.store, self.model, self.watch, self._keeper)
-        self.operator = Operator(config, self.model, self.store, self._uploads, start)
+        self._keeper = StringKeeper(self.store, model.string)
+        self._learner = Learner(self.store, model, self.watch, self._keeper)
+        self.operator = OperatorAccess(config, self.model, self.store, self._uploads, start)
         self.operator.changed = self._publish
         self.operator.ended = self.endpoint.mail.withdraw
         self.operator.accepted = self._note_order
         self._learner.restore()
-        self.model.crew_alarms.restore(self.store.alarms(), conditions_of(self.model))
+        self.model.crew_alarms.restore(self.store.alarms(), self._conditions())
 
     def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
         """A frame arrived from the encoder."""
-        if now - self.model.now > HEARTBEAT:
+        if now - self._string.time.now > HEARTBEAT:
             self._advance_time(now)  # it stood still: what it knew then must not be shown as of now
         self._send_pending(now)
         for received in self.endpoint.receive(side, frame, now, margin):
@@ -150,7 +149,7 @@ class GroundProcess(Process):
             return
         self._note(DEPTH, now, content)
         try:
-            reading = decode(content)
+            reading = decode_message(content)
         except DecodeError:
             reading = None
         if not isinstance(reading, DepthReading):
@@ -199,7 +198,7 @@ class GroundProcess(Process):
         self.tape.add(kind, now, rig_now, clock.epoch, content)
 
     def _note_order(self, name: str, parameters: Mapping[str, str], by: str) -> None:
-        self._note(ORDER, self.model.now, [name, dict(parameters), by])
+        self._note(ORDER, self._string.time.now, [name, dict(parameters), by])
 
     def _send_pending(self, now: float) -> None:
         for outgoing in self.operator.take_pending():
@@ -213,13 +212,13 @@ class GroundProcess(Process):
 
     def _advance_time(self, now: float) -> None:
         """Follow rig time and its epoch, also where nothing comes any more."""
-        model, clock = self.model, self.clock
-        model.now = now
-        model.revision += 1
+        time, clock = self._string.time, self.clock
+        time.now = now
+        self.model.revisions.on_event()
         if not clock.synchronised:
             return
-        is_new, before = clock.epoch != model.epoch, model.epoch
-        model.on_rig_time(clock.rig_from_local(now), clock.epoch)
+        is_new, before = clock.epoch != time.epoch, time.epoch
+        self._string.on_rig_time(clock.rig_from_local(now), clock.epoch)
         if is_new:
             if before != EPOCH_UNKNOWN:
                 self.watch.on_epoch(clock.epoch)
@@ -247,7 +246,8 @@ class GroundProcess(Process):
         for tube, (first, last) in self.watch.gaps_to_ask(now):
             self._ask_again(tube, first, last)
         self.operator.expire_orders(now)
-        stale = {tube for tube in self.model.nodes if self.model.is_stale(tube)}
+        states = self._string.states
+        stale = {tube for tube in states.newest if states.is_stale(tube)}
         changed, self._stale = sorted(stale ^ self._stale), stale
         if changed:
             self._publish([*(f"nodes/{tube}" for tube in changed), "status", "string"])
@@ -266,11 +266,14 @@ class GroundProcess(Process):
     def _tell_crew(self, now: float) -> None:
         """Follow what is wrong with the alarms that the crew works with, and keep them."""
         alarms = self.model.crew_alarms
-        alarms.update(conditions_of(self.model), Times(now, self.model.rig_now, time.time()))
+        alarms.update(self._conditions(), Times(now, self._string.time.rig_now, time.time()))
         if changed := alarms.drain_changed():
             with refusing_disk():
                 self.store.keep_alarms(changed)
             self._publish(["alarms"])
+
+    def _conditions(self) -> list[Condition]:
+        return conditions_of(self.model.rig_alarms, self._string, self.model.hole)
 
     def _ask_again(self, tube: int, first: int, last: int) -> None:
         """Order a tube to send the surveys of a range of numbers again."""
@@ -280,25 +283,20 @@ class GroundProcess(Process):
             return  # the tube is not known yet; the gap stays
         order.when_answered(lambda: self._on_resent(order))
 
-    def _on_resent(self, order: Order) -> None:
+    def _on_resent(self, order: SentOrder) -> None:
         values = order.values
         if order.done and order.tube is not None:
             sent, complete_from = int(str(values.get("sent", 0))), int(str(values.get("complete_from", 0)))
-            self.watch.on_resent(order.tube, sent, complete_from, self.model.now)
+            self.watch.on_resent(order.tube, sent, complete_from, self._string.time.now)
 
     def _on_reading(self, reading: DepthReading, now: float) -> None:
-        model = self.model
-        refused = model.depths.on_reading(reading, model.epoch, model.rig_now, now, model.tally.deepest)
+        refused = self._string.on_depth(reading, now)
         self.watch.on_depth("" if refused == "repeated" else refused)
         self._keeper.keep_depth_doubt()
         if refused:
             return
-        model.depth_heard_at = now
         for stand in reading.stands:
-            is_present = stand.epoch in (EPOCH_UNKNOWN, model.epoch) and stand.ended_at <= reading.at
-            is_news = is_present and not model.depths.is_of_before(stand, model.epoch)
-            if is_news and stand.md <= model.tally.deepest:
-                take_stand(model.depths, model.stops, replace(stand, epoch=model.epoch))
+            self._string.on_told_stand(stand, reading.at)
         self._keeper.keep_stand(reading)
         self._place_waiting()
         self._publish(["status", "string"])
@@ -311,7 +309,8 @@ class GroundProcess(Process):
         self._note(MESSAGE, now, message)
         self._advance_time(now)
         match message:
-            case NodeState() if self.model.on_state(message, now):
+            case NodeState() if self._string.on_state(message, now):
+                self.model.recalibration.on_state(message)
                 self.watch.on_state(message)
                 with refusing_disk():
                     self._keeper.keep_tally()
@@ -339,9 +338,7 @@ class GroundProcess(Process):
             self._publish(changed)
 
     def _publish(self, changed: list[str]) -> None:
-        model = self.model
-        model.revision += 1  # an older answer can be told by it
-        model.changed_at |= {path: model.revision for path in changed if "/" not in path and path not in BEATS}
+        self.model.revisions.on_published(changed)
         for listener in self.listeners:
             listener(changed)
 

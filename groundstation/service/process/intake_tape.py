@@ -16,7 +16,7 @@ import msgpack
 from groundstation.errors import GroundError
 from telemetry.errors import DecodeError
 from telemetry.messages import Message
-from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.presentation.msgpack_codec import decode_message, encode_message
 
 KEPT = 4096  # events
 VERSION = 1
@@ -61,7 +61,7 @@ class Tape:
 
 def pack_intake(event: Intake) -> bytes:
     """An event on the wire."""
-    content = encode(event.content) if event.kind == MESSAGE else event.content
+    content = encode_message(event.content) if event.kind == MESSAGE else event.content
     return bytes(msgpack.packb([VERSION, event.number, event.kind, event.now, event.rig_now, event.epoch, content]))
 
 
@@ -83,13 +83,13 @@ def unpack_intake(payload: bytes) -> Intake:
     numbers = all(isinstance(value, int) and not isinstance(value, bool) for value in (number, epoch))
     if not numbers or kind not in KINDS or not isinstance(now, float) or not isinstance(rig_now, float):
         raise IntakeError(f"expected an event of an intake, got {row!s:.40}")
-    return Intake(number, kind, now, rig_now, epoch, _content(kind, content))
+    return Intake(number, kind, now, rig_now, epoch, _checked_content(kind, content))
 
 
-def _content(kind: str, content: Any) -> Any:
+def _checked_content(kind: str, content: Any) -> Any:
     if kind == MESSAGE:
         try:
-            message: Message = decode(content)
+            message: Message = decode_message(content)
         except (DecodeError, TypeError) as error:
             raise IntakeError(f"expected a message, got {content!s:.40}") from error
         return message

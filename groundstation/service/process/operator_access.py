@@ -11,7 +11,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from groundstation.config import GroundConfig
@@ -20,11 +19,12 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.paths import find_path
 from groundstation.service.disk.ground_store import Store
 from groundstation.service.orders.blocks import block_of_files
-from groundstation.service.orders.order_book import Order, OrderState
+from groundstation.service.orders.order_book import OrderState, SentOrder
 from groundstation.service.orders.recalibration.control import Recalibration
 from groundstation.service.orders.recalibration.procedure import Request
 from groundstation.service.orders.surveyed_biases import surveyed_biases
 from groundstation.service.orders.uploads import Uploads
+from groundstation.survey.fusion.force_biases import SurveyedBiases
 from telemetry.application.arguments import check_arguments, parse_parameters, parse_tube
 from telemetry.application.commands import COMMANDS, CommandSpec, ObeyedBy, find_command
 from telemetry.errors import CommandError
@@ -51,13 +51,13 @@ class BlockUpload:
 Outgoing = Command | BlockUpload
 
 
-class Operator:
+class OperatorAccess:
     """What operators may do, whatever gateway they come in by.
 
     Parameters
     ----------
     config : of the ground station
-    model, store : what it knows, and where it keeps it
+    model, store : what is known, for its answers, and where it is kept
     uploads : that are under way; None without a key of the rig
     start : number of this start of the ground station, which no order of another start shares
     """
@@ -69,14 +69,14 @@ class Operator:
         self._model = model
         self._store = store
         self._uploads = uploads
-        self._orders = model.orders
+        self._orders, self._string = model.orders, model.string
         self._numbers = itertools.count((start << START_SHIFT) + 1)
         self._pending: deque[Outgoing] = deque()
         self._accepted_at: dict[int, float] = {}  # s, own clock, of the orders that have no answer yet
         self._recalibration = Recalibration(
-            model.recalibration, store, config.calibrations, self._cancel_upload, partial(surveyed_biases, model)
+            model.recalibration, store, config.calibrations, self._cancel_upload, self._surveyed_biases
         )
-        self._handlers: dict[str, Callable[[Order], None]] = {
+        self._handlers: dict[str, Callable[[SentOrder], None]] = {
             spec.name: getattr(self, spec.name) for spec in COMMANDS if spec.by is ObeyedBy.GROUND
         }
         self.wake: Callable[[], None] = lambda: None  # called when something is to be sent
@@ -106,7 +106,7 @@ class Operator:
         """
         return find_path(self._model, path).json(self._model, {})
 
-    def order(self, name: str, parameters: Mapping[str, str], by: str = "operator") -> Order:
+    def order(self, name: str, parameters: Mapping[str, str], by: str = "operator") -> SentOrder:
         """Accept an order as an operator writes it.
 
         Raises
@@ -128,7 +128,9 @@ class Operator:
             self.accepted(name, parameters, by)
         return order
 
-    def command(self, tube: int, name: str, arguments: Mapping[str, Any] | None = None, by: str = "operator") -> Order:
+    def command(
+        self, tube: int, name: str, arguments: Mapping[str, Any] | None = None, by: str = "operator"
+    ) -> SentOrder:
         """Accept an order for a tube with arguments in SI.
 
         Raises
@@ -144,7 +146,7 @@ class Operator:
             raise SelectorError(str(error)) from error
         return self._accept(spec, tube, given, by)
 
-    def upload(self, block: ParameterBlock, by: str = "operator") -> Order:
+    def upload(self, block: ParameterBlock, by: str = "operator") -> SentOrder:
         """Send a block to its tube until the tube has judged it.
 
         Raises
@@ -161,10 +163,10 @@ class Operator:
         self._keep(order)
         return order
 
-    def upload_parameters(self, order: Order) -> None:
+    def upload_parameters(self, order: SentOrder) -> None:
         """Upload the calibrations that are named, as the version after the one in use unless a version is named."""
         tube, arguments = order.tube or 0, order.arguments
-        version, state = arguments.get("version"), self._model.nodes.get(tube)
+        version, state = arguments.get("version"), self._string.states.newest.get(tube)
         if version is None and state is None:
             raise SelectorError(f"tube {tube}: its state, and so its version, is not known yet; expected version=..")
         if version is None and state is not None:
@@ -174,28 +176,28 @@ class Operator:
         self._check_key()
         self._start_upload(order, block)
 
-    def recalibrate(self, order: Order) -> None:
+    def recalibrate(self, order: SentOrder) -> None:
         """Take a step of the calibration in the field."""
         self._check_key()
-        self._recalibration.step(order.spec.action, order.arguments, self._model.rig_now, self._model.tally.tubes)
+        self._recalibration.step(order.spec.action, order.arguments, self._string.time.rig_now, self._string.tubes)
         order.advance(OrderState.DONE)
         self.changed(["recalibration"])
 
-    def accept_depth(self, order: Order) -> None:
+    def accept_depth(self, order: SentOrder) -> None:
         """Believe the depth that comes from now on."""
-        self._model.depths.accept()
+        self._string.depths.accept()
         self._model.rig_alarms.clear("depth_refused", "depth")
         order.advance(OrderState.DONE)
 
-    def accept_joints(self, order: Order) -> None:
+    def accept_joints(self, order: SentOrder) -> None:
         """Take the angles at which the joints stand for right."""
-        self._model.joints.accept()
+        self._string.joints.accept()
         for alarm in list(self._model.rig_alarms):
             if alarm.kind.code == "joint":
                 self._model.rig_alarms.clear("joint", alarm.subject)
         order.advance(OrderState.DONE)
 
-    def alarm(self, order: Order) -> None:
+    def alarm(self, order: SentOrder) -> None:
         """Acknowledge an alarm, shelve it or take it back; kept on the disk before the order is done."""
         alarms, utc = self._model.crew_alarms, time.time()
         number, by = int(order.arguments["number"]), order.by
@@ -222,7 +224,7 @@ class Operator:
         self._accepted_at = {o.number: self._accepted_at.get(o.number, now) for o in self._waiting()}
         self.publish_orders()
 
-    def reply_of(self, order: Order) -> dict[str, Any]:
+    def reply_of(self, order: SentOrder) -> dict[str, Any]:
         """Answer to the sender of an order: the order, or how far the calibration in the field has come."""
         is_recalibration = order.spec.name == "recalibrate"
         return self.ask("recalibration" if is_recalibration else f"orders/{order.number}")
@@ -243,7 +245,9 @@ class Operator:
         procedure = self._model.recalibration
         outgoing: list[Outgoing] = []
         for request in procedure.due_requests(now):
-            order = self._new_order(find_command(request.name), request.tube, _arguments(request), RECALIBRATION)
+            order = self._new_order(
+                find_command(request.name), request.tube, _request_arguments(request), RECALIBRATION
+            )
             procedure.on_sent(request, order.number)
             self._keep(order, wake=False)
             if request.block is not None:
@@ -272,7 +276,7 @@ class Operator:
         if numbers := self._orders.drain_changed():
             self.changed(["orders", *(f"orders/{number}" for number in numbers)])
 
-    def _accept(self, spec: CommandSpec, tube: int | None, arguments: dict[str, Any], by: str) -> Order:
+    def _accept(self, spec: CommandSpec, tube: int | None, arguments: dict[str, Any], by: str) -> SentOrder:
         if tube is not None:
             self._check_tube(tube)
             self._check_room(tube)
@@ -284,23 +288,27 @@ class Operator:
         self._keep(order)
         return order
 
-    def _new_order(self, spec: CommandSpec, tube: int | None, arguments: dict[str, Any], by: str) -> Order:
+    def _new_order(self, spec: CommandSpec, tube: int | None, arguments: dict[str, Any], by: str) -> SentOrder:
         utc = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
-        return Order(next(self._numbers), spec, tube, arguments, by, self._model.rig_now, utc)
+        return SentOrder(next(self._numbers), spec, tube, arguments, by, self._string.time.rig_now, utc)
 
-    def _keep(self, order: Order, *, wake: bool = True) -> None:
+    def _keep(self, order: SentOrder, *, wake: bool = True) -> None:
         self._orders.add(order)
         self.publish_orders()
         if wake:
             self.wake()
 
-    def _start_upload(self, order: Order, block: ParameterBlock) -> None:
+    def _start_upload(self, order: SentOrder, block: ParameterBlock) -> None:
         """Keep a block, so that what the tube uses later can be named, and have it sent."""
         if self._model.recalibration.uploads_to(block.tube):
             raise SelectorError(f"tube {block.tube}: a calibration uploads to it; expected action=cancel before")
         self._store.keep_block(block)
         self._model.recalibration.blocks[block.sha256().hex()] = block
         self._pending.append(BlockUpload(order.number, block))
+
+    def _surveyed_biases(self) -> SurveyedBiases:
+        states, mixed = self._string.states.newest, self._recalibration.procedure.progress.mixed
+        return surveyed_biases(self._config, self._model.hole, states, mixed)
 
     def _cancel_upload(self, tube: int) -> None:
         if self._uploads is not None:
@@ -310,7 +318,7 @@ class Operator:
         if self._uploads is None:
             raise ConfigurationError(NO_KEY)
 
-    def _waiting(self) -> list[Order]:
+    def _waiting(self) -> list[SentOrder]:
         return [order for order in self._orders if not order.answered and order.by != RECALIBRATION]
 
     def _check_room(self, tube: int) -> None:
@@ -319,7 +327,8 @@ class Operator:
             raise SelectorError(f"tube {tube}: expected at most {OPEN_AT_MOST} orders without an answer, got {waiting}")
 
     def _check_tube(self, tube: int) -> None:
-        known = self._model.tally.tubes + [t for t in sorted(self._model.nodes) if t not in self._model.tally.tubes]
+        hanging = self._string.tubes
+        known = hanging + [tube for tube in sorted(self._string.states.newest) if tube not in hanging]
         if tube not in known:
             expected = f"expected one of {', '.join(map(str, known))}" if known else "no tube has reported yet"
             raise SelectorError(f"tube {tube}: not in the string; {expected}")
@@ -337,5 +346,5 @@ def check_name(by: str) -> None:
         raise SelectorError(f"by: expected a name of 1 to {LONGEST_NAME} printable characters, got {by!r:.40}")
 
 
-def _arguments(request: Request) -> dict[str, Any]:
+def _request_arguments(request: Request) -> dict[str, Any]:
     return dict(request.arguments) if request.block is None else {"version": request.block.version}

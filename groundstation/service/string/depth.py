@@ -71,7 +71,7 @@ NEVER: Instant = (-1, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Doubt:
+class DepthDoubt:
     """What a later start has to know: what it may not believe, and what the crew has looked at."""
 
     trusted: tuple[int, float, float] | None = None  # epoch, time and depth (m) of the last reading before a jump
@@ -139,7 +139,7 @@ class DepthLog:
             return None
         for place in range(len(self.stands) - 1, -1, -1):
             known = self.stands[place]
-            if known.md == stand.md and _same(known, stand):
+            if known.md == stand.md and _is_same_stand(known, stand):
                 begun_at, ended_at = min(known.begun_at, stand.begun_at), max(known.ended_at, stand.ended_at)
                 self.stands[place] = Stand(stand.epoch, begun_at, ended_at, stand.md)
                 return self.stands[place]
@@ -154,13 +154,13 @@ class DepthLog:
                 self._doubt(doubtful)
             self._suspect(max(against, key=lambda known: known.begun_at), stand)
             return None
-        insort(self.stands, stand, key=_begin)
+        insort(self.stands, stand, key=_stand_begin)
         del self.stands[:-STANDS_KEPT]
         return stand
 
     def stand_before(self, stand: Stand) -> Stand | None:
         """The last known stand that began before another."""
-        place = bisect_left(self.stands, (stand.epoch, stand.begun_at), key=_begin)
+        place = bisect_left(self.stands, (stand.epoch, stand.begun_at), key=_stand_begin)
         return self.stands[place - 1] if place else None
 
     def is_of_before(self, stand: Stand, epoch: int) -> bool:
@@ -168,17 +168,17 @@ class DepthLog:
         if stand.epoch != EPOCH_UNKNOWN:
             return False
         before = (known for known in self.stands if known.epoch != epoch and stand.ended_at <= known.ended_at)
-        return any(_same(replace(stand, epoch=known.epoch), known) for known in before)
+        return any(_is_same_stand(replace(stand, epoch=known.epoch), known) for known in before)
 
     @property
-    def doubt(self) -> Doubt:
+    def doubt(self) -> DepthDoubt:
         """What is to be kept beside the stands."""
         times = tuple(self._doubtful)
         if self.jumped and times:
             times = (*times[:-1], replace(times[-1], ended_at=math.inf))
-        return Doubt(self._trusted if self.jumped else None, self._accepted, times)
+        return DepthDoubt(self._trusted if self.jumped else None, self._accepted, times)
 
-    def recall(self, doubt: Doubt) -> None:
+    def recall(self, doubt: DepthDoubt) -> None:
         """Go on with what was kept, before any stand is believed."""
         self._accepted = doubt.accepted
         self._doubtful.extend(doubt.times)
@@ -200,7 +200,7 @@ class DepthLog:
         found = None if track is None else track.depth_at(time)
         if found is not None:
             return found
-        k = bisect_right(self.stands, (epoch, time), key=_begin) - 1
+        k = bisect_right(self.stands, (epoch, time), key=_stand_begin) - 1
         stand = self.stands[k] if k >= 0 else None
         return stand.md if stand is not None and stand.epoch == epoch and time <= stand.ended_at else None
 
@@ -214,7 +214,7 @@ class DepthLog:
         """What of a stand is not of a doubtful time; one in which the crew has looked is not, whatever came before."""
         looked = (stand.epoch, stand.begun_at) <= self._accepted < (stand.epoch, stand.ended_at)
         doubtful = (d for d in self._doubtful if not (looked and (d.epoch, d.ended_at) <= self._accepted))
-        begun_at = max((time.ended_at for time in doubtful if _overlap(time, stand)), default=stand.begun_at)
+        begun_at = max((time.ended_at for time in doubtful if _stands_overlap(time, stand)), default=stand.begun_at)
         if begun_at == stand.begun_at:
             return stand
         goes_on = self._trusted == (stand.epoch, stand.ended_at, stand.md)
@@ -230,7 +230,7 @@ class DepthLog:
     def _doubt(self, time: Stand) -> None:
         """Believe no stand of a time, also where one was believed before."""
         self._doubtful.append(time)
-        self.stands = [known for known in self.stands if not _overlap(time, known)]
+        self.stands = [known for known in self.stands if not _stands_overlap(time, known)]
 
     def _agree(self, one: Stand, other: Stand) -> bool:
         """Whether the bit can have moved from one stand to the other in the time between them."""
@@ -302,18 +302,18 @@ class DepthLog:
         return self._tracks[epoch]
 
 
-def _begin(stand: Stand) -> Instant:
+def _stand_begin(stand: Stand) -> Instant:
     return stand.epoch, stand.begun_at
 
 
-def _same(one: Stand, other: Stand) -> bool:
-    return (one.epoch, one.md) == (other.epoch, other.md) and _touch(one, other)
+def _is_same_stand(one: Stand, other: Stand) -> bool:
+    return (one.epoch, one.md) == (other.epoch, other.md) and _stands_touch(one, other)
 
 
-def _overlap(one: Stand, other: Stand) -> bool:
+def _stands_overlap(one: Stand, other: Stand) -> bool:
     """Whether two times have more than an instant in common."""
     return one.epoch == other.epoch and one.begun_at < other.ended_at and other.begun_at < one.ended_at
 
 
-def _touch(one: Stand, other: Stand) -> bool:
+def _stands_touch(one: Stand, other: Stand) -> bool:
     return one.begun_at <= other.ended_at and other.begun_at <= one.ended_at

@@ -12,7 +12,7 @@ SERIES_KEPT = 64
 
 
 @dataclass(slots=True)
-class Series:
+class ReceivedSeries:
     """Numbers of one series of a tube, counted from the first after ``base``."""
 
     base: int
@@ -39,11 +39,11 @@ class Series:
             before = max(before, number)
 
 
-class Numbers:
+class MessageNumbers:
     """Numbers of every tube."""
 
     def __init__(self) -> None:
-        self._series: dict[int, dict[int, Series]] = {}
+        self._series: dict[int, dict[int, ReceivedSeries]] = {}
 
     def add_number(self, tube: int, number: int) -> None:
         """A message is stored."""
@@ -84,11 +84,11 @@ class Numbers:
         """Tubes of which something is known."""
         return sorted(self._series)
 
-    def _of(self, tube: int, number: int) -> Series:
+    def _of(self, tube: int, number: int) -> ReceivedSeries:
         base = number >> SERIES_SHIFT << SERIES_SHIFT
         known = self._series.setdefault(tube, {})
         if base not in known:
-            known[base] = Series(base, complete=base, told=0)
+            known[base] = ReceivedSeries(base, complete=base, told=0)
             while len(known) > SERIES_KEPT:
                 del known[next(iter(known))]
         return known[base]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from groundstation.service.string.depth import DepthLog
-from groundstation.service.string.stops import Stops, belongs
+from groundstation.service.string.stops import Stops, is_in_stand
 from telemetry.frozen import replace
 from telemetry.messages import Stand
 
@@ -37,5 +37,5 @@ def take_stand(depths: DepthLog, stops: Stops, told: Stand) -> None:
 def take_survey(depths: DepthLog, stops: Stops, epoch: int, at: float) -> None:
     """Take the first known stand for a stop if a survey was taken in it, at ``at`` (s): its begin was not heard."""
     for first in depths.stands[:1]:
-        if belongs(first, epoch, at):
+        if is_in_stand(first, epoch, at):
             stops.on_stand(first)

@@ -58,7 +58,7 @@ class Stop:
 
     def covers(self, stand: Stand) -> bool:
         """Whether a stand is a part of the stop."""
-        return any(_covers(whole, stand) for whole in (self.stand, *self.later))
+        return any(_stand_covers(whole, stand) for whole in (self.stand, *self.later))
 
     def age(self, epoch: int, rig_now: float) -> float:
         """Seconds from its begin to ``rig_now`` (s) of an epoch, fewer where rig time began anew; infinite after it."""
@@ -125,7 +125,7 @@ class Stops:
 
     def know(self, stand: Stand) -> bool:
         """Whether a stand is that of a stop, or more of it."""
-        return any(_same(stop.stand, stand) for stop in self._stops)
+        return any(_is_same_stop(stop.stand, stand) for stop in self._stops)
 
     def is_too_short(self, stand: Stand) -> bool:
         """Whether a stand is that of a stop, or a part of it, in which no survey was owed."""
@@ -137,12 +137,12 @@ class Stops:
 
     def on_stand(self, stand: Stand) -> None:
         """A stand has begun, or lasted longer; the tubes are those that are known to hang while it lasts."""
-        known = next((stop for stop in reversed(self._stops) if _same(stop.stand, stand)), None)
+        known = next((stop for stop in reversed(self._stops) if _is_same_stop(stop.stand, stand)), None)
         if known is not None:
             known.stand = stand
             self._add_tubes(known)
             return
-        self._stops.append(Stop(stand, tuple(self._in_the_hole(stand.md))))
+        self._stops.append(Stop(stand, tuple(self._tally.tubes_below(IN_THE_HOLE, stand.md))))
         del self._stops[:-STOPS_KEPT]
 
     def on_later_stand(self, before: Stand, stand: Stand) -> None:
@@ -162,7 +162,7 @@ class Stops:
             if stop.judged or stop.lasted < SHORTEST or age < self._due or (age == math.inf and not is_settled):
                 continue
             stop.judged = True
-            stop.tubes = stop.tubes or tuple(self._in_the_hole(stop.stand.md))
+            stop.tubes = stop.tubes or tuple(self._tally.tubes_below(IN_THE_HOLE, stop.stand.md))
             stop.missing = set(stop.tubes) - self._taken.tubes_of(stop)
             self._owed += [stop] if stop.missing else []
         del self._owed[:-STOPS_KEPT]
@@ -170,23 +170,18 @@ class Stops:
     def _add_tubes(self, stop: Stop) -> None:
         """A tube that is heard while the bit stands hung there before."""
         if not stop.judged:
-            stop.tubes = tuple(dict.fromkeys((*stop.tubes, *self._in_the_hole(stop.stand.md))))
-
-    def _in_the_hole(self, md: float) -> Iterator[int]:
-        for tube, below in self._tally.lengths_below():
-            if md - below > IN_THE_HOLE:
-                yield tube
+            stop.tubes = tuple(dict.fromkeys((*stop.tubes, *self._tally.tubes_below(IN_THE_HOLE, stop.stand.md))))
 
 
-def belongs(stand: Stand, epoch: int, at: float) -> bool:
+def is_in_stand(stand: Stand, epoch: int, at: float) -> bool:
     """Whether a survey was taken during a stand."""
     return epoch == stand.epoch and stand.begun_at - AROUND <= at <= stand.ended_at + AROUND
 
 
-def _covers(whole: Stand, stand: Stand) -> bool:
+def _stand_covers(whole: Stand, stand: Stand) -> bool:
     is_within = whole.begun_at <= stand.begun_at and stand.ended_at <= whole.ended_at
     return (whole.epoch, whole.md) == (stand.epoch, stand.md) and is_within
 
 
-def _same(one: Stand, other: Stand) -> bool:
+def _is_same_stop(one: Stand, other: Stand) -> bool:
     return (one.epoch, one.md) == (other.epoch, other.md) and one.begun_at <= other.ended_at >= one.ended_at

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 
 FITS = 0.5  # of a tube's length by which depth and tally may differ
 
@@ -66,10 +66,14 @@ class Tally:
         """Whether the bit can be so deep (m) under a tube so many hops down with ``below`` (m) of string below it."""
         return hops < 1 or md <= (hops + FITS) * self._tube_length + below
 
-    def lengths_below(self) -> Iterator[tuple[int, float]]:
-        """Every tube from the top down, with the length (m) of string below its node."""
+    def tubes_below(self, md: float, bit: float) -> list[int]:
+        """Tubes from the top down whose nodes are deeper than ``md`` (m) while the bit is at ``bit`` (m)."""
+        found = []
         for place, tube in enumerate(self.tubes, 1):
-            yield tube, (len(self.tubes) - place) * self._tube_length
+            below = (len(self.tubes) - place) * self._tube_length
+            if bit - below > md:
+                found.append(tube)
+        return found
 
     def length_below(self, tube: int) -> float | None:
         """Length (m) of string below a tube's node, which sits at the tube's lower end; None for an unknown tube."""

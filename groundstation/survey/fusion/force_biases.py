@@ -18,8 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.fusion.resolve import resolve_direction
-from groundstation.survey.fusion.shared import StopDirection
+from groundstation.survey.fusion.resolve import Direction, resolve_direction
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
@@ -76,24 +75,31 @@ class SurveyedBiases:
 
 
 def look_of(
-    station: Hashable, tube: int, reading: StopDirection, force: Array, var: float, yaw: float, gravity: float
+    station: Hashable,
+    tube: int,
+    direction: Direction,
+    shared: tuple[Array, Places],
+    force: Array,
+    var: float,
+    yaw: float,
+    gravity: float,
 ) -> Look:
-    """Return the look of one tube at a station, from its resolved stop.
+    """Look of one stop.
 
     Parameters
     ----------
-    station, tube, reading : of the tube at the station
+    station, tube, direction : of the tube at the station
+    shared : causes (2, 5) and places, see ``SharedErrors.causes_of``
     force, var : (3,) m/s^2, mean specific force, and (m/s^2)^2 of each of its axes
     yaw : rad, with which it was resolved
     gravity : m/s^2, of the site
     """
     size = float(np.linalg.norm(force))
-    mount, joints = reading.causes[:, :1], reading.causes[:, 1:2]
-    places = reading.places[:-AXES]
-    columns = np.concatenate([mount, np.repeat(joints, len(places) - 1, axis=1)], axis=1)
+    causes, places = shared[0], shared[1][:-AXES]
+    columns = np.concatenate([causes[:, :1], np.repeat(causes[:, 1:2], len(places) - 1, axis=1)], axis=1)
     by_force = resolve_direction(force, var * np.eye(AXES), yaw, 0.0).by_force
     return Look(
-        station, tube, reading.lean, reading.cov, by_force, columns, places, force / size, size - gravity, var
+        station, tube, direction.lean, direction.cov, by_force, columns, places, force / size, size - gravity, var
     )  # fmt: skip
 
 

@@ -86,11 +86,18 @@ def known_direction(inclination: float, azimuth: float) -> Direction:
 
 @dataclass(frozen=True, slots=True)
 class Resolved:
-    """A resolved stop: its direction, without shared errors, and how they would act on it."""
+    """Resolved stops side by side, or one: directions without shared errors, and how those would act on them."""
 
-    direction: Direction
-    by_force: Array  # (2, 3) change of the lean for one m/s^2 on each body axis
-    by_yaw: Array  # (2,) change of the lean for one rad of yaw
+    lean: Array  # (n, 2), or (2,) of one
+    down: Array  # (n,), of one a number
+    cov: Array  # (n, 2, 2)
+    by_force: Array  # (n, 2, 3) change of the lean for one m/s^2 on each body axis
+    by_yaw: Array  # (n, 2) change of the lean for one rad of yaw
+
+    @property
+    def direction(self) -> Direction:
+        """Direction of one stop."""
+        return Direction(self.lean, float(self.down), self.cov, np.zeros((2, 0)))
 
 
 def resolve_direction(force: Array, force_cov: Array, yaw: float, yaw_var: float) -> Resolved:
@@ -106,18 +113,22 @@ def resolve_direction(force: Array, force_cov: Array, yaw: float, yaw_var: float
     SurveyError
         When the force vanishes or is not finite, or nothing is uncertain in some direction of the lean.
     """
-    return resolve_all(force[None], force_cov[None], [yaw], [yaw_var])[0]
+    found = resolve_all(force[None], force_cov[None], [yaw], [yaw_var])
+    return Resolved(found.lean[0], found.down[0], found.cov[0], found.by_force[0], found.by_yaw[0])
 
 
-def resolve_all(forces: Array, covs: Array, yaws: Sequence[float], yaw_vars: Sequence[float]) -> list[Resolved]:
-    """Return ``resolve_direction`` of stops (n, 3) and (n, 3, 3), equal bit for bit; raises if one of them fails."""
+def resolve_all(forces: Array, covs: Array, yaws: Sequence[float], yaw_vars: Sequence[float] | Array) -> Resolved:
+    """The same of many stops, (n, 3) and (n, 3, 3), bit for bit; raises where one of them cannot be resolved."""
     sizes = np.sqrt((forces[:, None] @ forces[:, :, None])[:, 0, 0])
-    for size, yaw in zip(sizes.tolist(), yaws, strict=True):
+    turns = np.zeros((len(forces), 2, 3))  # from the body to north and east
+    for turn, size, yaw in zip(turns, sizes.tolist(), yaws, strict=True):
         if not math.isfinite(size) or size < 1e-3 or not math.isfinite(yaw):
             raise SurveyError(
                 f"resolve: expected a finite specific force and yaw, got |f| = {size} m/s^2, yaw = {yaw} rad"
             )
-    turns = np.array([_turn(yaw) for yaw in yaws])
+        turn[0, 0] = turn[1, 1] = math.cos(yaw)
+        turn[1, 0] = math.sin(yaw)
+        turn[0, 1] = -turn[1, 0]
     units = forces / sizes[:, None]
     leans = (turns @ units[:, :, None])[:, :, 0]
     by_force = (turns - leans[:, :, None] * units[:, None]) / sizes[:, None, None]
@@ -126,23 +137,17 @@ def resolve_all(forces: Array, covs: Array, yaws: Sequence[float], yaw_vars: Seq
     found = by_force @ covs @ by_force.transpose(0, 2, 1) + turned
     if not is_covariance(found):
         raise SurveyError(f"resolve: expected a positive definite covariance of the lean, got {found.tolist()}")
-    nothing = np.zeros((2, 0))
-    directions = [
-        Direction(lean, -unit[2], cov, nothing) for lean, unit, cov in zip(leans, units.tolist(), found, strict=True)
-    ]
-    return [Resolved(*row) for row in zip(directions, by_force, by_yaw, strict=True)]
-
-
-def _turn(yaw: float) -> list[list[float]]:
-    """From the body to north and east (2, 3)."""
-    c, s = math.cos(yaw), math.sin(yaw)
-    return [[c, -s, 0.0], [s, c, 0.0]]
+    return Resolved(leans, -units[:, 2], found, by_force, by_yaw)
 
 
 def is_covariance(covs: Array) -> bool:
     """Whether every matrix of (..., k, k) is finite, symmetric, positive definite and safely invertible."""
-    if covs.size <= A_FEW and all(_is_plainly_one(cov) for cov in covs.reshape(-1, *covs.shape[-2:]).tolist()):
-        return True
+    if covs.size <= A_FEW:
+        for cov in covs.reshape(-1, *covs.shape[-2:]).tolist():
+            if not _is_plainly_one(cov):
+                break
+        else:
+            return True
     if not np.all(np.isfinite(covs)):
         return False
     asymmetry = np.max(np.abs(covs - np.swapaxes(covs, -1, -2)), axis=(-2, -1))
@@ -156,20 +161,21 @@ def _is_plainly_one(cov: list[list[float]]) -> bool:
 
     The smallest eigenvalue is at least the determinant over the trace to the power k - 1.
     """
-    k = len(cov)
-    if not 1 < k <= 3:
+    if len(cov) not in (2, 3):
         return False
-    size = max(abs(value) for row in cov for value in row)
-    if any(not abs(cov[i][j] - cov[j][i]) <= ASYMMETRY * size for i in range(k) for j in range(i)):
-        return False
-    minor = cov[0][0] * cov[1][1] - cov[1][0] * cov[1][0]
-    det, trace = minor, cov[0][0] + cov[1][1]
-    if k == 3:
-        (_, _, _), (b, _, _), (c, e, f) = cov
-        det = f * minor - e * (cov[0][0] * e - b * c) + c * (b * e - cov[1][1] * c)
+    (a, other_b), (b, d) = cov[0][:2], cov[1][:2]
+    size, apart = max(abs(a), abs(b), abs(d)), abs(b - other_b)
+    minor = a * d - b * b
+    det, trace = minor, a + d
+    power = trace * trace
+    if len(cov) == 3:
+        (_, _, other_c), (_, _, other_e), (c, e, f) = cov
+        size, apart = max(size, abs(c), abs(e), abs(f)), max(apart, abs(c - other_c), abs(e - other_e))
+        det = f * minor - e * (a * e - b * c) + c * (b * e - d * c)
         trace += f
-    # a product, for a power of numbers of a hostile message would raise where this is infinite
-    return cov[0][0] > 0.0 and minor > 0.0 and det > PLAINLY * math.prod([trace] * k)
+        power = trace * trace * trace  # a power of numbers of a hostile message would raise where this is infinite
+    is_symmetric = apart <= ASYMMETRY * size
+    return is_symmetric and a > 0.0 and minor > 0.0 and det > PLAINLY * power
 
 
 def direction_angles(lean: Array, down: float) -> tuple[float, float]:
@@ -224,8 +230,8 @@ def check_all(
     covs: Array,
     combined: tuple[Array, Array],
     gravity: float,
-    samples: Sequence[int],
-    settle_times: Sequence[float],
+    samples: Sequence[int] | npt.NDArray[np.int64],
+    settle_times: Sequence[float] | Array,
     sample_std: float,
 ) -> list[Quality]:
     """Quality of stops, (n, imus, 3) and (n, imus, 3, 3), given the combined IMUs of each, (n, 3) and (n, 3, 3).
@@ -238,7 +244,7 @@ def check_all(
     spread = np.abs(forces - means[:, None]).max(axis=(-2, -1))
     spread_var = largest_var + mean_covs.diagonal(axis1=-2, axis2=-1).max(axis=-1)
     wrong = np.where(np.abs(sizes - gravity) > GRAVITY_TOLERANCE * gravity, Quality.GRAVITY, Quality.GOOD)
-    wrong |= np.where(largest_var * samples > (3.0 * sample_std) ** 2, Quality.MOTION, Quality.GOOD)
+    wrong |= np.where(largest_var * np.asarray(samples) > (3.0 * sample_std) ** 2, Quality.MOTION, Quality.GOOD)
     wrong |= np.where(np.asarray(settle_times) < SHORTEST_SETTLE, Quality.SETTLE, Quality.GOOD)
     wrong |= np.where(spread**2 > 16.0 * spread_var, Quality.SPREAD, Quality.GOOD)
     return [Quality(each) for each in wrong.tolist()]

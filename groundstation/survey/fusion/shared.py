@@ -8,7 +8,6 @@ themselves.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
@@ -29,51 +28,6 @@ KIND_NAMES = sorted(set(KINDS.values()))
 TRANSPORT = "transport"  # of columns that random errors share; they are of no kind
 
 
-class StopDirection(Direction):
-    """Direction of one tube's stop. Its shared columns are made on demand from the five columns of their causes.
-
-    The mount, each joint and the three axes of the accelerometer: that is five columns, of which that of a joint stands
-    at the place of every joint above. Fifty tubes share 250 errors, and a ground station keeps every reading.
-    """
-
-    __slots__ = ("_information", "causes", "places", "width")
-    _information: Array | None
-    causes: Array
-    places: Places
-    width: int
-
-    def __init__(
-        self, bare: Direction, causes: Array, places: Places, width: int, information: Array | None = None
-    ) -> None:
-        """``causes`` (2, 5); ``places`` of the mount, the joints and the axes, among the ``width`` errors known."""
-        for name in ("lean", "down", "cov"):
-            object.__setattr__(self, name, getattr(bare, name))
-        object.__setattr__(self, "causes", causes)
-        object.__setattr__(self, "places", places)
-        object.__setattr__(self, "width", width)
-        object.__setattr__(self, "_information", information)
-
-    @property
-    def shared(self) -> Array:
-        """Columns (2, s), made anew."""
-        columns = np.zeros((2, self.width))
-        self.fill(columns)
-        return columns
-
-    def fill(self, columns: Array) -> None:
-        """Write the shared columns into ``columns``, zeros (2, >= s)."""
-        put_columns(columns, self.causes, self.places)
-
-    @property
-    def information(self) -> Array:
-        """Inverse (2, 2) of ``total_cov``, computed once."""
-        known = self._information
-        if known is None:
-            known = super().information
-            object.__setattr__(self, "_information", known)
-        return known
-
-
 def put_columns(columns: Array, causes: Array, places: Places) -> None:
     """Write the columns of a reading into zeros (2, s): mount, every joint alike, and axes, from ``causes`` (2, 5)."""
     columns[:, places[0]] = causes[:, 0]
@@ -84,7 +38,7 @@ def put_columns(columns: Array, causes: Array, places: Places) -> None:
 def columns_of(causes: Array, places: Sequence[Places], width: int) -> Array:
     """Columns (n, 2, width) of several readings, from (n, 2, 5) and the places of each."""
     columns = np.zeros((len(causes), 2, width))
-    counts = np.array([len(own) for own in places])
+    counts = np.array([*map(len, places)])
     ends = counts.cumsum()
     cause = np.ones(ends[-1], np.intp)  # of a place: every joint alike
     cause[ends - counts] = 0
@@ -96,47 +50,39 @@ def columns_of(causes: Array, places: Sequence[Places], width: int) -> Array:
 
 
 class Packed:
-    """Columns (k, s) of which most are zero: a station knows those of the tubes that passed it, of a hundred tubes."""
+    """Columns (k, s) of which most are zero: a station knows those of the tubes that passed it, of a hundred tubes.
 
-    __slots__ = ("_places", "_values", "_width")
+    Attributes
+    ----------
+    width : how many there are
+    places : (c,) of those that may not be zero
+    values : (k, c) what stands there
+    """
+
+    __slots__ = ("places", "values", "width")
 
     def __init__(self, columns: Array, places: Places | None = None) -> None:
         """``places`` of those that are not zero, where they are known."""
-        places = np.flatnonzero(columns.any(axis=0)) if places is None else places
-        self._places = places.astype(np.uint16 if columns.shape[1] <= MOST_OF_16_BITS else np.intp)
-        self._values = columns.take(places, axis=1)
-        self._width = int(columns.shape[1])
-
-    @property
-    def width(self) -> int:
-        """Number s of columns."""
-        return self._width
-
-    @property
-    def places(self) -> npt.NDArray[Any]:
-        """Places (c,) of those that may not be zero."""
-        return self._places
-
-    @property
-    def values(self) -> Array:
-        """Columns (k, c) at ``places``."""
-        return self._values
+        at = np.flatnonzero(columns.any(axis=0)) if places is None else places
+        self.places: npt.NDArray[Any] = at.astype(np.uint16 if columns.shape[1] <= MOST_OF_16_BITS else np.intp)
+        self.values: Array = columns.take(at, axis=1)
+        self.width = int(columns.shape[1])
 
     def under(self, matrix: Array) -> Packed:
         """Return the columns ``matrix`` (j, k) @ columns (k, s), of shape (j, s)."""
         made = Packed.__new__(Packed)
-        made._places, made._values, made._width = self._places, matrix @ self._values, self._width
+        made.places, made.values, made.width = self.places, matrix @ self.values, self.width
         return made
 
     def columns(self) -> Array:
-        """Return all columns (k, s) in a new array."""
-        columns = np.zeros((len(self._values), self._width))
+        """All of them (k, s), made anew."""
+        columns = np.zeros((len(self.values), self.width))
         self.fill(columns)
         return columns
 
     def fill(self, columns: Array) -> None:
-        """Write the columns into ``columns``, zeros (k, >= s)."""
-        columns[:, self._places] = self._values
+        """Put them into zeros (k, s or more)."""
+        columns[:, self.places] = self.values
 
 
 def packed_each(columns: Array) -> list[Packed]:
@@ -189,10 +135,12 @@ class SharedErrors:
         self._known: dict[tuple[int, ...] | int, Places] = {}  # by a tube and those above it, or a tube alone
         self._transport: list[int] = []
 
-    def __len__(self) -> int:
+    @property
+    def count(self) -> int:
+        """Errors met so far."""
         return len(self._columns)
 
-    def reading(
+    def direction_of(
         self,
         resolved: Resolved,
         tube: int,
@@ -200,8 +148,23 @@ class SharedErrors:
         systematic_var: float,
         mount_var: float,
         force_bias_std: float,
-    ) -> StopDirection:
-        """Direction of a reading with its columns.
+    ) -> Direction:
+        """Direction of one stop with its columns, parameters as ``causes_of``."""
+        causes, places = self.causes_of(resolved, tube, above, systematic_var, mount_var, force_bias_std)
+        columns = np.zeros((2, len(self._columns)))
+        put_columns(columns, causes, places)
+        return Direction(resolved.lean, float(resolved.down), resolved.cov, columns)
+
+    def causes_of(
+        self,
+        resolved: Resolved,
+        tube: int,
+        above: Sequence[int] | None,
+        systematic_var: float,
+        mount_var: float,
+        force_bias_std: float,
+    ) -> tuple[Array, Places]:
+        """What one stop shares (2, 5), and at which places its columns stand.
 
         Parameters
         ----------
@@ -211,14 +174,11 @@ class SharedErrors:
         systematic_var, mount_var : rad^2, of the yaw: all constant errors, and the part of the tube's own mount
         force_bias_std : m/s^2, of each axis of the accelerometer, left after calibration
         """
-        mount_var = min(mount_var, systematic_var)
-        places = self._places_of(tube, above)
-        each = math.sqrt((systematic_var - mount_var) / (len(places) - 1 - AXES))
-        causes = np.empty((2, CAUSES))
-        causes[:, 0] = math.sqrt(mount_var) * resolved.by_yaw
-        causes[:, 1] = each * resolved.by_yaw
-        causes[:, 2:] = force_bias_std * resolved.by_force
-        return StopDirection(resolved.direction, causes, places, len(self._columns))
+        places = self.places_of(tube, above)
+        by_yaw, by_force = resolved.by_yaw[None], resolved.by_force[None]
+        return causes_of_all(by_yaw, by_force, [places], np.array([systematic_var]), mount_var, force_bias_std)[
+            0
+        ], places
 
     def variances(self, columns: Array) -> Array:
         """Variances (n, kinds, k) of what has these columns (n, k, s), by kind in the order of ``KIND_NAMES``."""
@@ -234,7 +194,7 @@ class SharedErrors:
             self._transport.append(self._place_of((TRANSPORT, len(self._transport))))
         return self._transport[:count]
 
-    def _places_of(self, tube: int, above: Sequence[int] | None) -> Places:
+    def places_of(self, tube: int, above: Sequence[int] | None) -> Places:
         """Places of the errors of a tube, kept once for all of its readings in one string."""
         string = tube if above is None else (tube, *above)
         known = self._known.get(string)
@@ -270,21 +230,37 @@ def stack_shared_errors(directions: Sequence[Direction], width: int) -> Array:
     return columns
 
 
-def weigh_together(readings: Sequence[StopDirection]) -> None:
-    """Work out the information of many readings at once, bit for bit as each by itself.
+def causes_of_all(
+    by_yaw: Array, by_force: Array, places: Sequence[Places], systematic_var: Array, mount_var: float, bias_std: float
+) -> Array:
+    """What stops share (n, 2, 5): mount, joints and the three axes, each as it acts on the lean.
+
+    Parameters
+    ----------
+    by_yaw, by_force : (n, 2) and (n, 2, 3) change of the lean for one rad, and one m/s^2
+    places : of the columns of each stop
+    systematic_var, mount_var : (n,) and one, rad^2, see ``SharedErrors.causes_of``
+    bias_std : m/s^2, of each axis of an accelerometer
+    """
+    mount = np.minimum(mount_var, systematic_var)
+    joints = np.array([*map(len, places)]) - 1 - AXES
+    causes = np.empty((len(places), 2, CAUSES))
+    causes[:, :, 0] = np.sqrt(mount)[:, None] * by_yaw
+    causes[:, :, 1] = np.sqrt((systematic_var - mount) / joints)[:, None] * by_yaw
+    causes[:, :, 2:] = bias_std * by_force
+    return causes
+
+
+def weights_of(covs: Array, causes: Array, places: Sequence[Places], width: int) -> Array:
+    """Information (n, 2, 2) of stops: the inverse of all they do not know, of ``width`` shared errors at most.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        When one of them has none; then none is known.
+        When one of them has none.
     """
-    if not readings:
-        return
-    causes, places = np.array([one.causes for one in readings]), [one.places for one in readings]
-    shared = columns_of(causes, places, max(one.width for one in readings))
-    covs = np.array([one.cov for one in readings]) + shared @ shared.transpose(0, 2, 1)
-    for one, information in zip(readings, np.linalg.inv(covs), strict=True):
-        object.__setattr__(one, "_information", information)
+    shared = columns_of(causes, places, width)
+    return np.asarray(np.linalg.inv(covs + shared @ shared.transpose(0, 2, 1)))
 
 
 def widen_shared_errors(shared: Array, columns: int) -> Array:

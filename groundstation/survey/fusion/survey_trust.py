@@ -13,6 +13,8 @@ force knows the length of a lean by the cosine of the inclination better than th
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from enum import IntEnum
 from functools import cache, reduce
 from operator import or_
@@ -64,18 +66,38 @@ def trust_of(flags: NodeFlag) -> Trust:
 
 
 def with_unknown_yaw(resolved: Resolved) -> Resolved:
-    """Return the stop with the covariance of a lean of unknown azimuth."""
-    return _spread(resolved, ALONG, ACROSS)
+    """The same stop with the covariance of a lean whose azimuth is not known."""
+    return spread_yaws(resolved, ALONG, ACROSS)
 
 
 def with_uncertain_yaw(resolved: Resolved, yaw_var: float) -> Resolved:
-    """Return the stop with the covariance that its yaw variance (rad^2) adds beyond the linear term."""
+    """The same stop where the whole variance of its yaw (rad^2) may take its lean off the straight line."""
+    return spread_yaws(resolved, uncertain_along(yaw_var), 0.0)
+
+
+def with_yaws_of(resolved: Resolved, yaw_vars: Sequence[float], trusts: Sequence[int]) -> Resolved:
+    """Many stops (n), each with a yaw that is uncertain by its variance (rad^2), or by its trust is not known."""
+    along, across = np.empty(len(trusts)), np.zeros(len(trusts))
+    for k, (yaw_var, trust) in enumerate(zip(yaw_vars, trusts, strict=True)):
+        if trust == Trust.UNKNOWN_YAW:
+            along[k], across[k] = ALONG, ACROSS
+        else:
+            along[k] = uncertain_along(yaw_var)
+    return spread_yaws(resolved, along[:, None, None], across[:, None, None])
+
+
+def uncertain_along(yaw_var: float) -> float:
+    """Part of the squared lean along it that a variance of its yaw (rad^2) makes, without a difference of equals."""
     a = math.expm1(-yaw_var / 2.0)
-    return _spread(resolved, a * a * (3.0 + 2.0 * a + a * a / 2.0), 0.0)  # without a difference of what is nearly equal
+    return a * a * (3.0 + 2.0 * a + a * a / 2.0)
 
 
-def _spread(resolved: Resolved, along: float, across: float) -> Resolved:
+def spread_yaws(resolved: Resolved, along: Array | float, across: Array | float) -> Resolved:
     """Add these parts of the squared lean to the covariance along it and across."""
-    d, lean, side = resolved.direction, np.asarray(resolved.direction.lean), resolved.by_yaw
-    cov = d.cov + along * np.outer(lean, lean) + across * np.outer(side, side)
-    return Resolved(type(d)(d.lean, d.down, cov, d.shared), resolved.by_force, resolved.by_yaw)
+    lean, side = resolved.lean, resolved.by_yaw
+    cov = (
+        resolved.cov
+        + along * (lean[..., :, None] * lean[..., None, :])
+        + across * (side[..., :, None] * side[..., None, :])
+    )
+    return replace(resolved, cov=cov)

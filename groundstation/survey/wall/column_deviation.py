@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from operator import attrgetter
 
 import numpy as np
 import numpy.typing as npt
@@ -162,7 +163,7 @@ class Deviations:
         return len(self.md)
 
     def __getitem__(self, place: int) -> Deviation:
-        md, along, limit = (float(values[place]) for values in (self.md, self.along, self.limit))
+        md, along, limit = self.md.item(place), self.along.item(place), self.limit.item(place)
         return Deviation(md, along, self.offset[place], self.cov[place], limit)
 
     def __iter__(self) -> Iterator[Deviation]:
@@ -177,14 +178,17 @@ class Deviations:
         ratio = np.where(limit > 0.0, size / np.where(limit > 0.0, limit, 1.0), infinite)
         # of the few that come near it each says itself how large it is: two ways of rounding must not part them
         near = np.flatnonzero(ratio >= (1.0 - ROUNDED) * ratio.max(initial=0.0)).tolist()
-        return max((self[first + place] for place in near), key=lambda one: one.ratio, default=None)
+        if len(near) <= 1:
+            return self[first + near[0]] if near else None
+        return max([self[first + place] for place in near], key=attrgetter("ratio"))
 
 
 def axis_deviations(md: Array, positions: Array, covs: Array, design: ColumnDesign) -> Deviations:
     """Deviation of points at depths (n,), m, with positions (n, 3) and their covariances (n, 3, 3)."""
     offsets = positions - np.array(design.head)
     # number by number: in a product of matrices the last bits of one point depend on how many others there are
-    along, first, second = ((offsets * unit).sum(axis=1) for unit in (design.axis, *design.across))
+    along = (offsets * design.axis).sum(axis=1)
+    first, second = (offsets * design.across[0]).sum(axis=1), (offsets * design.across[1]).sum(axis=1)
     across = np.stack([first, second], axis=1)
     limit = design.tolerance.start + design.tolerance.growth * np.maximum(along, 0.0)
     return Deviations(md.copy(), along, across, design.across @ covs @ design.across.T, limit)

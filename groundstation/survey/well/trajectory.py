@@ -166,8 +166,8 @@ class Trajectory:
             if not 0.0 < md - before < math.inf:
                 raise SurveyError(f"trajectory: expected a depth beyond {before:g} m, got {md:g} m")
         known = len(self)
-        for md, direction in stations:
-            self._insert(len(self), md, direction)
+        for place, (md, direction) in enumerate(stations, known):
+            self._insert(place, md, direction)
         self._direct(range(known, len(self)))
         try:
             self._draw(known)
@@ -243,9 +243,10 @@ class Trajectory:
             begin -= begin % BLOCK
             del self._kept[begin + 1 :], self._marks[begin // BLOCK + 1 :]
             self._sums = self._marks[-1]
-        rows = self._rows[begin : len(self)]
+        end = len(self)
+        rows = self._rows[begin:end]
         rows["position"] = np.add.accumulate([rows["position"][0], *self._legs(rows)])
-        followed = self._follow(self._sums, begin, len(self) - 1, with_columns=self._keeps_columns)
+        followed = self._follow(self._sums, begin, end - 1, with_columns=self._keeps_columns)
         rows["cov"][1:] = followed.covs
         self._sums = followed.sums
         self._marks += followed.marks

@@ -7,7 +7,7 @@ lowest that pyproject.toml allows. What each part buys:
 * ``ConstantType``: what stands around the filter is written once and compiled for floats and for integers, constants
   and all. The alternative is every such module twice.
 * ``ByAddress``: a kernel that calls a node's step needs no copy of it (``benchmarks/by_address.py``).
-* ``NO_WRAPPER``: kernels that nobody calls through a C pointer are compiled without code for that.
+* ``NO_WRAPPER``: kernels that are never called through a C pointer are compiled without code for that.
 * ``kept_where``: a kept function is known by our sources and not by the date of its file.
 * ``leave_blas_out``: a process starts a quarter of a second sooner.
 """
@@ -139,7 +139,7 @@ def leave_blas_out() -> None:
     """Have numba load without a BLAS: for a process of ours, whose kernels multiply by themselves.
 
     Numba imports ``scipy.linalg`` as it compiles or loads its first function, a quarter of a second of every start, and
-    holds that none is there where the import fails. Not for an interpreter that runs somebody else's code too.
+    holds that none is there where the import fails. Not for an interpreter that runs foreign code too.
     """
     name = "scipy.linalg"
     if name in sys.modules:

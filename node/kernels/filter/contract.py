@@ -1,6 +1,6 @@
 """The two forms of the filter side by side: where each function stands, and what it takes in floats and in integers.
 
-A rule of the filter is written twice, in ``float64`` and in ``fixed``. Whoever changes one form changes this table, and
+A rule of the filter is written twice, in ``float64`` and in ``fixed``. A change of one form changes this table, and
 with it sees the other: tests/node/test_two_filters.py compares the table with the functions of both, so that none of
 them gains or loses a function or an argument by itself. An argument is written as ``name`` or ``name:format``, where it
 is not called as its format is.

@@ -24,7 +24,7 @@ from node.kernels.arithmetic.quantity import NONE, ONE, factor_quantity, time_qu
 from node.kernels.record.filter_record import PARTS, RECENT, RING
 from node.kernels.record.ring import is_split
 
-INSTANT: Final = time_quantity(1e-6)  # s, up to which a time is no time
+INSTANT: Final = time_quantity(1e-6)  # s, shorter spans count as zero
 GAP: Final = time_quantity(1e-3)  # s, between two cycles that adjoin
 BENT: Final = factor_quantity(0.25)  # of a bend, see ``bent_angle``
 

@@ -15,7 +15,7 @@ from node.kernels.record.filter_record import UNKNOWN_YAW_VAR, CycleStatus, Err
 BX = kernel_constant(Err.BIAS_X)
 UNKNOWN_VAR: Final = variance_quantity(UNKNOWN_YAW_VAR)  # rad^2
 PSI = kernel_constant(Err.YAW)
-STATIC_BIAS, TRACKING, STILL, SURVEY, HELD = 1, 3, 4, 5, 6  # telemetry.messages.Mode, which kernels do not see
+STATIC_BIAS, TRACKING, STILL, SURVEY, HELD = 1, 3, 4, 5, 6  # telemetry.messages.NodeMode, which kernels do not see
 STOPPED, STARTED, SURVEY_READY = int(CycleStatus.STOPPED), int(CycleStatus.STARTED), int(CycleStatus.SURVEY_READY)
 JOINT_OPENED, JOINT_CLOSED = int(CycleStatus.JOINT_OPENED), int(CycleStatus.JOINT_CLOSED)
 BIAS_KNOWN, RATE_EXCEEDED, RATE_RECOVERED = (

@@ -120,7 +120,7 @@ def move_dates(state: Any, later: float) -> None:
 
 @kernel
 def forget_dates(state: Any) -> None:
-    """What waits was dated by a clock that nobody can compare with the present one; it may come again, dated anew."""
+    """Drop waiting aidings: their clock cannot be compared with the present one. They may come again, dated anew."""
     state.pending = 0
     state.last_sequence = -1
 

@@ -1,4 +1,4 @@
-"""What a node has to say of itself: codes with numbers in a ring of its record, until somebody takes them out."""
+"""Events of a node: codes with arguments in a ring of its record, until they are taken out."""
 
 from __future__ import annotations
 

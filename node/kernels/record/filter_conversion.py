@@ -1,8 +1,8 @@
 """Conversion at the edge of the integer loop: configuration, state, readings and aiding, SI floats and Q formats.
 
 Here alone a float becomes an integer and an integer a float, beside the loop and never inside it: readings once a
-cycle, configuration and state when somebody changed them. What does not fit is held at the end of its range and
-counted in ``overflows``. Nothing allocates: integers go into records that are given.
+cycle, configuration and state when they were changed from outside. What does not fit is held at the end of its range
+and counted in ``overflows``. Nothing allocates: integers go into records that are given.
 """
 
 from __future__ import annotations
@@ -167,7 +167,7 @@ def hold_forces(record: Any, made: Array, given: Array, gravity: float) -> None:
 
 @kernel
 def whole_yaw(angle: float) -> int:
-    """Binary angle of ``angle`` (rad) of any size; 0 of one that is none."""
+    """Binary angle of ``angle`` (rad) of any size, 2^32 a turn; 0 if it is not finite."""
     if not math.isfinite(angle):
         return 0
     return math.floor(angle % TURN / TURN * 4294967296.0 + 0.5) & 0xFFFFFFFF

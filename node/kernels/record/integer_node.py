@@ -280,5 +280,5 @@ SETTINGS_INSIDE, PARAMETERS_INSIDE = word_offset(INTEGERS, "settings"), word_off
 
 
 def new_integers() -> Array:
-    """Integers of a node whose record nobody has read yet, one record of dtype ``INTEGERS``."""
+    """Integers of a node whose record was not read yet, one record of dtype ``INTEGERS``."""
     return np.zeros(1, INTEGERS)

@@ -1,6 +1,6 @@
 """Words of a record between floats and integers, by a table of scales; see ``node.kernels.record.integer_node``.
 
-What is no number is ``NO_NUMBER`` in integers, and -inf ``NEVER``; a number beyond its range is held and counted.
+NaN is ``NO_NUMBER`` in integers, and -inf ``NEVER``; a number beyond its range is held and counted.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The cluster: several IMUs in one tube, fused by inverse variance into one reading.
 
 Every gyroscope has its own constant bias: what each reads at rest beside the mean of all is learnt and taken off, so
-that the fused rate, and the bias that the filter knows, stay the same whoever is left out.
+that the fused rate, and the bias that the filter knows, stay the same whichever IMU is left out.
 """
 
 from __future__ import annotations

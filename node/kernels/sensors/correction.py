@@ -71,12 +71,12 @@ def correct_sensor(sensor: Any, temperature: float, reading: Array) -> None:
 def correct_cycle(parameters: Any, temperature: float, rate: Array, force: Array) -> None:
     """Correct one cycle's raw ``rate`` (3, rad/s) and ``force`` (3, m/s^2) in place; the identity touches no bit.
 
-    A reading with a number that is none is left as it is.
+    A reading with a non-finite component is left as it is.
 
     Parameters
     ----------
     parameters : record of dtype ``PARAMETERS``
-    temperature : C; what is no number counts as ``USUAL``
+    temperature : C; a non-finite one counts as ``USUAL``
     """
     if parameters.identity == 1 or not are_numbers(rate, force):
         return

@@ -47,7 +47,7 @@ def bounded_sum(total: float, a: float) -> float:
 
 @kernel
 def add_static(record: Any, rate: Array, force: Array, temperature: float, standing: int) -> int:
-    """Take one cycle's raw reading into the sums; returns 0 for one that is no number and is left out.
+    """Take one cycle's raw reading into the sums; returns 0 if it is not finite and left out.
 
     n m_n = (n - 1) m_(n-1) + x_n,  S_n = S_(n-1) + (n - 1)/n d d^T with d = x_n - m_(n-1).
 

@@ -1,7 +1,7 @@
 """One node in integers, compiled whole: ``node_step`` over the record of integers, and what is beside it.
 
-``integer_step`` and ``integer_aiding`` hold no float. Around them the float64 record is read where somebody changed
-it, and shown: reports and the saved state are taken from it.
+``integer_step`` and ``integer_aiding`` hold no float. Around them the float64 record is read where it was changed
+from outside, and shown: reports and the saved state are taken from it.
 """
 
 from __future__ import annotations

@@ -122,7 +122,7 @@ def node_step(nodes: Array, settings: Array, parameters: Array, readings: Array,
         window is known: then mean rates about z (rad/s) follow, of what it shows of the cycle before, and of the
         eighths of this one as far as it shows them
     moment : (8,) start and end (s, own clock), joined, hops, variance of the clock (s^2), synchronised, by how much (s)
-        the clock dates later than in the last cycle for it was put right (no number: nobody knows), and by how much its
+        the clock dates later than in the last cycle for it was put right (NaN: unknown), and by how much its
         rate may be off (s/s)
     """
     return int(step_around(run_cycle, nodes, settings, parameters, readings, moment))
@@ -267,7 +267,7 @@ def tell_status(node: Any) -> None:
 
 @kernel
 def say_events(node: Any) -> int:
-    """Whether there are events that nobody has taken yet, as a bit."""
+    """``SAY_EVENTS`` if there are events that were not taken yet, else 0."""
     return SAY_EVENTS if node.events.told != node.events.said else 0
 
 

@@ -1,4 +1,4 @@
-"""The integers of one node beside its float64 record: they learn what somebody changed, run, and show.
+"""The integers of one node beside its float64 record: they take up outside changes, run, and show.
 
 The integers are the filter. The float64 record is their shadow: it is written after every call, for reports and the
 saved state, and read back when its bytes are not those shown last (a new parameter block, a start from the saved

@@ -1,4 +1,4 @@
-"""The integers of a node beside its float64 record: they learn what somebody changed, and show what they are now.
+"""The integers of a node beside its float64 record: they take up outside changes, and show what they are now.
 
 Bytes are compared and not numbers, because some of the numbers are NaN. Of the events the ring is shown where one was
 told; the cluster only where there is one; an alignment and a static record only while they are under way.

@@ -88,7 +88,7 @@ def encoder_step(encoders: Array, drives: Array, sample: Array, aiding: Array) -
 
 @kernel
 def measure_turning(encoder: Any, sample: Array, aiding: Array) -> None:
-    """The last edge, or the middle of the count where nobody timed it."""
+    """Aiding of a string that turns: at the last edge, or at the middle of the count where the edge was not timed."""
     before_at, before_angle = encoder.edge_at, encoder.edge_angle
     take_edge(encoder, sample)
     encoder.resting = encoder.placed = 0

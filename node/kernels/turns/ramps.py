@@ -45,7 +45,7 @@ MOST_TIMES: Final = factor_quantity(16.0)
 LIMIT: Final = factor_quantity(36.0)  # sum of innovation^2 / variance, from where the ramp does not fit
 CONTRADICTED: Final = 4  # variances, from where the head at rest and the turn to it do not fit
 LARGEST: Final = variance_quantity(DEG**2)  # rad^2, variance of an innovation that counts by itself
-LEAST_DOUBT: Final = variance_quantity((0.002 * DEG) ** 2)  # rad^2, that is none any more
+LEAST_DOUBT: Final = variance_quantity((0.002 * DEG) ** 2)  # rad^2, below which a doubt counts as zero
 STARTING: Final = 14  # cycles of a string that has started, in which it may wind up, or be taken for a scale
 AGES: Final = 1000  # cycles, that are counted
 FAST: Final = rate_quantity(20.0 * DEG)  # rad/s, from where the scale is learnt
@@ -127,7 +127,7 @@ def follow_fit(node: Any, rejected: int) -> None:
 
 @kernel
 def has_come_to_rest(node: Any) -> bool:
-    """Whether the aiding used last is a head's at rest, well timed, of a string whose twist nobody tells.
+    """Whether the aiding used last is a head's at rest, well timed, of a string whose twist is not told.
 
     It is said only once in a rest. Where a twist is told the yaw was opened by it, and more is not to be doubted.
     """

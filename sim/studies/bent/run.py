@@ -136,7 +136,7 @@ def fused_stations(world: World, surveys: Sequence[StringSurvey], shared: Shared
             continue
         resolved = resolve_direction(np.array(m.imus[0].force), np.array(m.imus[0].force_cov), m.yaw, m.yaw_var)
         above = range(m.tube + 1, top + 1)
-        reading = shared.reading(resolved, m.tube, above, m.systematic_var, mount_var, bias_std)
+        reading = shared.direction_of(resolved, m.tube, above, m.systematic_var, mount_var, bias_std)
         fusions.setdefault(md, StationFusion()).add_reading(reading)
     return {md: fusions[md].fused() for md in sorted(fusions)}
 

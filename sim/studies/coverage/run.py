@@ -27,8 +27,8 @@ from sim.studies.pool import RunAll, Step, over_cores
 from sim.studies.published import wellbore_1
 from sim.studies.scenarios import CALIBRATED
 from sim.world.borehole import Borehole
+from sim.world.random_streams import RandomStream, random_stream
 from sim.world.scenario_file import AccelerometerSection, JointSection
-from sim.world.streams import Stream, stream
 
 Array = npt.NDArray[np.float64]
 TUBES = 10
@@ -59,7 +59,7 @@ class Rig:
     """One string of one well and its errors."""
 
     def __init__(self, seed: int) -> None:
-        self.random = stream(seed, Stream.WELLS)
+        self.random = random_stream(seed, RandomStream.WELLS)
         joints, accelerometer = JointSection(), AccelerometerSection(**CALIBRATED)
         self.joint_std = math.radians(joints.reading_std_deg)
         self.mount_std = math.radians(joints.mount_std_deg)
@@ -103,7 +103,7 @@ def drill_well(seed: int, pool: YawPool) -> tuple[Array, Array, Array]:
             above = range(tube + 1, stop + 1)
             systematic_var = hop * rig.joint_std**2 + rig.mount_std**2
             stations[station].add_reading(
-                shared.reading(resolved, tube, above, systematic_var, rig.mount_std**2, rig.bias_std)
+                shared.direction_of(resolved, tube, above, systematic_var, rig.mount_std**2, rig.bias_std)
             )
     trajectory = Trajectory()
     for k in range(1, TUBES + 1):

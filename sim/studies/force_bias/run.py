@@ -137,8 +137,9 @@ def looks_of(world: World, surveys: Sequence[StringSurvey]) -> list[tuple[int, L
             continue
         force, cov = np.array(m.imus[0].force), np.array(m.imus[0].force_cov)
         resolved = resolve_direction(force, cov, m.yaw, m.yaw_var)
-        reading = shared.reading(resolved, m.tube, range(m.tube + 1, stop + 1), m.systematic_var, mount_var, 0.0)
-        found.append((stop, look_of(station, m.tube, reading, force, float(np.trace(cov)) / AXES, m.yaw, GRAVITY)))
+        causes = shared.causes_of(resolved, m.tube, range(m.tube + 1, stop + 1), m.systematic_var, mount_var, 0.0)
+        var = float(np.trace(cov)) / AXES
+        found.append((stop, look_of(station, m.tube, resolved.direction, causes, force, var, m.yaw, GRAVITY)))
     return found
 
 

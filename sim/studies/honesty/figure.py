@@ -6,7 +6,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from sim.campaign.figure import honesty_figure
+from sim.campaign.campaign_figures import honesty_figure
 
 
 def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from node.kernels.record.filter_record import Scheme
-from sim.campaign.run import run_campaign
+from sim.campaign.campaign_run import run_campaign
 from sim.studies.consistency.run import EVERY, SHOWN, setup_of
 from sim.studies.pool import Step
 from sim.studies.worlds.run import WORLDS
@@ -41,7 +41,7 @@ def run_study(runs: int, hops: int, world: str, step: Step) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``cases``: a row of state and hop, as ``sim.campaign.summary.honesty`` has it, of the hops that are shown;
+        ``cases``: a row of state and hop, as ``sim.campaign.summary.honesty_rows`` has it, of the hops that are shown;
         ``traces``: the rows of all hops.
     """
     scenario = scenario_of(dict(WORLDS[world](setup_of(Scheme.FORWARD, hops))))

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.mwd_model import (
     Triad,
     gravity_inclination,
@@ -41,6 +40,7 @@ from sim.instruments.mwd_jig import (
     measure_tool,
 )
 from sim.studies.pool import Step
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
 FRESH = 10**6  # added to a tool's seed for the attitudes that its calibration has not seen

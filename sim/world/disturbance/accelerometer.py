@@ -11,8 +11,8 @@ from node.kernels.arithmetic.formats import PERIOD
 from sim.kernel import shared_body
 from sim.world.disturbance.lanes import Lane
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
+from sim.world.random_streams import RandomStream
 from sim.world.scenario_file import ScenarioFile
-from sim.world.streams import Stream
 
 
 def tilt_force(file: ScenarioFile) -> float:
@@ -23,10 +23,10 @@ def tilt_force(file: ScenarioFile) -> float:
 def draw_bias(imu: OneImu) -> Array:
     """Bias of one accelerometer (3,), m/s^2."""
     scale = imu.file.accelerometer.bias_std_deg * tilt_force(imu.file)
-    return np.asarray(scale * imu.random(Stream.ACCELEROMETER).standard_normal(3))
+    return np.asarray(scale * imu.random(RandomStream.ACCELEROMETER).standard_normal(3))
 
 
-def offset(samples: ImuSamples, _: OneImu, bias: Array) -> None:
+def offset_forces(samples: ImuSamples, _: OneImu, bias: Array) -> None:
     """Add the bias."""
     samples.force = samples.force + bias
 
@@ -48,7 +48,7 @@ def add_noise(samples: ImuSamples, imu: OneImu, _: None) -> None:
 
     A rough world has vibration of its own in place of that.
     """
-    a, random = imu.file.accelerometer, imu.random(Stream.ACCELEROMETER)
+    a, random = imu.file.accelerometer, imu.random(RandomStream.ACCELEROMETER)
     noise_deg = imu.noise * a.noise_deg
     if samples.period != PERIOD:
         noise_deg *= math.sqrt(PERIOD / samples.period)
@@ -79,7 +79,7 @@ FORCE_BIAS = Disturbance(
     "force-bias",
     ("accelerometer.bias_std_deg",),
     ActsOn.SAMPLES,
-    offset,
+    offset_forces,
     draw_bias,
     Compiled(tube=(("force_bias", "f8", (3,)),), set_tube=set_bias, read=read_bias),  # m/s^2
 )

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from node.kernels.arithmetic.formats import Array
-from sim.kernel import compiled
+from sim.kernel import compile_function
 from sim.world.disturbance.lanes import FREE, WIDTH, Lane, count_numbers
 from sim.world.disturbance.row import Compiled, Disturbance
 
@@ -37,11 +37,11 @@ def count_drawn(rows: Sequence[Disturbance]) -> int:
 def chain_forms(rows: Sequence[Disturbance], form: str) -> Any:
     """One kernel that calls one of ``FORMS`` of every row that has it, in their order."""
     starts = lane_starts(rows)
-    chain = compiled(do_nothing_apart if form == "parts" else do_nothing, cache=False, inline="always")
+    chain = compile_function(do_nothing_apart if form == "parts" else do_nothing, cache=False, inline="always")
     for row in rows:
         act = getattr(row.compiled or Compiled(), form)
         if act is not None:
-            link = after_parts if form == "parts" else after
+            link = after_parts if form == "parts" else chain_row
             chain = link(chain, act, starts.get(row.name, 0))
     return chain
 
@@ -56,14 +56,14 @@ def do_nothing_apart(
     """Begin a chain of ``parts``."""
 
 
-def after(before: Any, act: Any, start: int) -> Any:
+def chain_row(before: Any, act: Any, start: int) -> Any:
     """Kernel of those ``before`` and one row more, whose lane begins at ``start``."""
 
     def act_in_order(shared: Any, tube: Any, now: Any, drawn: Array, row: Array) -> None:
         before(shared, tube, now, drawn, row)
         act(shared, tube, now, drawn, start, row)
 
-    return compiled(act_in_order, cache=False, inline="always")
+    return compile_function(act_in_order, cache=False, inline="always")
 
 
 def after_parts(before: Any, act: Any, start: int) -> Any:
@@ -75,4 +75,4 @@ def after_parts(before: Any, act: Any, start: int) -> Any:
         before(shared, tube, now, drawn, further, borders, pieces, parts)
         act(shared, tube, now, drawn, start, further, borders, pieces, parts)
 
-    return compiled(act_in_order, cache=False, inline="always")
+    return compile_function(act_in_order, cache=False, inline="always")

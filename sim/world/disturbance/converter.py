@@ -18,7 +18,7 @@ AT_RANGE = 0.999  # of a range, from where a sample stands at it
 FRAME_STEPS = 32768.0  # of a range
 
 
-def clipped(values: Array, limit: float) -> tuple[Array, Mask]:
+def clip_values(values: Array, limit: float) -> tuple[Array, Mask]:
     """Values (n, 3) within a range, and whether any of a row stood at it (n,)."""
     if max(values.max(), -values.min()) < AT_RANGE * limit:
         return values, np.zeros(len(values), np.bool_)
@@ -27,13 +27,13 @@ def clipped(values: Array, limit: float) -> tuple[Array, Mask]:
 
 def clip_forces(samples: ImuSamples, imu: OneImu, _: None) -> None:
     """Cut what the converter of the accelerometer does not reach."""
-    samples.force, at_range = clipped(samples.force, G * imu.rough.sensor.force_range_g)
+    samples.force, at_range = clip_values(samples.force, G * imu.rough.sensor.force_range_g)
     samples.clipped |= FORCE_CLIPPED * at_range
 
 
 def clip_signal(samples: ImuSamples, imu: OneImu, _: None) -> None:
     """Cut what the converter of the gyroscope does not reach."""
-    samples.rate, at_range = clipped(samples.rate, math.radians(imu.file.gyroscope.range_dps))
+    samples.rate, at_range = clip_values(samples.rate, math.radians(imu.file.gyroscope.range_dps))
     samples.clipped |= GYRO_CLIPPED * at_range
 
 
@@ -59,7 +59,7 @@ def step_of(file: ScenarioFile, *, is_frame: bool) -> float:
     return math.radians(g.range_dps / FRAME_STEPS if is_frame else g.resolution_dps)
 
 
-def quantise(samples: ImuSamples, imu: OneImu, _: None) -> None:
+def quantise_rates(samples: ImuSamples, imu: OneImu, _: None) -> None:
     """Round the rates to the step."""
     if (step := step_of(imu.file, is_frame=samples.is_frame)) > 0.0:
         samples.rate = np.round(samples.rate / step) * step
@@ -114,7 +114,7 @@ STEPS = Disturbance(
     "steps",
     ("gyroscope.resolution_dps",),
     ActsOn.SAMPLES,
-    quantise,
+    quantise_rates,
     compiled=Compiled(shared=(("step", "f8"),), set_shared=set_step, read=read_steps),  # rad/s; 0: none
 )
 RANGE = Disturbance(

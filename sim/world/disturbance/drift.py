@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.world.disturbance.row import ActsOn, Array, Disturbance, ImuSamples, OneImu
+from sim.world.random_streams import RandomStream
 from sim.world.scenario_file import DriftSection
-from sim.world.streams import Stream
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Drift:
 
 def draw_drift(imu: OneImu) -> Drift | None:
     """Drift of one IMU, where the scenario has the table."""
-    return None if imu.file.drift is None else Drift.draw(imu.file.drift, imu.random(Stream.DRIFT))
+    return None if imu.file.drift is None else Drift.draw(imu.file.drift, imu.random(RandomStream.DRIFT))
 
 
 def drift_away(samples: ImuSamples, _: OneImu, drift: Drift | None) -> None:

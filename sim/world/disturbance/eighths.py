@@ -9,7 +9,7 @@ import numpy as np
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import PARTS
 from sim.world.disturbance.row import ActsOn, Array, Disturbance, OneImu
-from sim.world.streams import Stream
+from sim.world.random_streams import RandomStream
 
 
 def borders_of(ends: Array) -> Array:
@@ -17,7 +17,7 @@ def borders_of(ends: Array) -> Array:
     return np.asarray(ends[:, None] + PERIOD * (np.arange(-PARTS, 1) / PARTS))
 
 
-def eighths(mean: Array, turned: Array, imu: OneImu) -> Array:
+def rates_of_eighths(mean: Array, turned: Array, imu: OneImu) -> Array:
     """Rates about z (n, 9, rad/s) as a driver tells them: 0, for nothing is shown of the cycle before, and the eighths.
 
     They are as exact as the mean is. Their noise is white, of their band, and its mean is that of the cycle, which
@@ -30,7 +30,7 @@ def eighths(mean: Array, turned: Array, imu: OneImu) -> Array:
     """
     density = imu.noise * imu.file.gyroscope.noise_dps_rthz[2]
     white = math.radians(density) / math.sqrt(PERIOD / PARTS)
-    noise = imu.random(Stream.INCREMENTS).standard_normal(turned.shape)
+    noise = imu.random(RandomStream.INCREMENTS).standard_normal(turned.shape)
     apart = turned * (PARTS / PERIOD) + white * noise
     own = mean[:, None] + apart - apart.mean(axis=1, keepdims=True)
     return np.concatenate([np.zeros((len(mean), 1)), own], axis=1)

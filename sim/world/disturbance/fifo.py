@@ -17,8 +17,8 @@ from node.process.drivers.fifo_window import parts_of
 from node.process.drivers.frame_clock import FrameClock
 from sim.world.disturbance.converter import AT_RANGE, FORCE_CLIPPED, GYRO_CLIPPED
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, Flags, ImuSamples, Mask, OneImu
+from sim.world.random_streams import RandomStream
 from sim.world.scenario_file import ScenarioFile
-from sim.world.streams import Stream
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ def frame_times(imu: OneImu, t: Array) -> Array:
     """Rig times (n,) of the frames of an IMU on the grid ``t``, s."""
     sensor = imu.rough.sensor
     step = 1.0 / (sensor.frames_hz * (1.0 + sensor.crystal))
-    first = float(t[0]) + step * float(imu.random(Stream.ROUGH_FRAMES).random())
+    first = float(t[0]) + step * float(imu.random(RandomStream.ROUGH_FRAMES).random())
     return np.arange(first, float(t[-1]), step)
 
 
@@ -85,7 +85,7 @@ def stamps_of(imu: OneImu, ends: Array) -> Array:
     stamps = np.concatenate([[ends[0] - PERIOD], ends])
     if jitter == 0.0:
         return stamps
-    return np.asarray(stamps + jitter * imu.random(Stream.ROUGH_JITTER).standard_normal(len(stamps)))
+    return np.asarray(stamps + jitter * imu.random(RandomStream.ROUGH_JITTER).standard_normal(len(stamps)))
 
 
 def read_fifo(frames: ImuSamples, imu: OneImu) -> FifoReads:

@@ -8,15 +8,15 @@ import numpy as np
 
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
 from sim.world.disturbance.vibration import G
+from sim.world.random_streams import RandomStream
 from sim.world.scenario_file import ScenarioFile
-from sim.world.streams import Stream
 
 
 def draw_pull(imu: OneImu) -> Array:
     """What the forces do to the axes of one gyroscope (3, 3), rad/s by m/s^2; none in a plain world."""
     if imu.file.rough is None:
         return np.zeros((3, 3))
-    drawn = imu.random(Stream.ROUGH_PULL).standard_normal((3, 3))
+    drawn = imu.random(RandomStream.ROUGH_PULL).standard_normal((3, 3))
     return np.asarray(math.radians(imu.rough.sensor.g_sensitivity_dps_per_g) / G * drawn)
 
 

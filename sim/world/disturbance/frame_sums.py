@@ -58,7 +58,7 @@ class Desk(NamedTuple):
     noise: Array  # (PARTS + 1,) rad/s, of the z gyroscope, summed over the frames of each part
 
 
-class Field(NamedTuple):
+class FrameField(NamedTuple):
     """What the nodes of a rough world feel, beside ``sim.string.schedule.StringSchedule``."""
 
     sums: Array  # (kinds, rows, FELT) of a perfect sensor behind its filter, over the frames before
@@ -130,14 +130,14 @@ class StillString:
         self._front_end = front_end_of(section, float(self.moved.t[0]))
         self.frame = float(self._front_end["frame"][0])
 
-    def field(self) -> Field:
+    def field(self) -> FrameField:
         """What all runs share; what a run draws is empty."""
         drills = [phase for phase in self._world.phases if phase.kind == "drill"]
         # a window of two cycles holds the begin of a turning or its end: a rest is longer
         at = np.searchsorted([phase.start for phase in drills], self._world.ends + PERIOD, side="right") - 1
         spans = np.array([(phase.start, phase.end) for phase in drills]) + self._delay
         sums, kinds = self._sums()
-        return Field(
+        return FrameField(
             sums=sums,
             kinds=kinds,
             times=no_frames(self._world.cycles),

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from sim.world.disturbance.low_pass import butterworth
+from sim.world.disturbance.low_pass import butterworth_coefficients
 from sim.world.disturbance.vibration import G
 from sim.world.rough_section import RoughSection
 
@@ -42,8 +42,8 @@ class Vibration:
     def __init__(self, section: RoughSection, frame: float, count: int) -> None:
         vibration = section.vibration
         self._count = count
-        self._force = G * vibration.turning_g * folded(section, frame, count, is_angle=False)
-        self._rate = math.radians(vibration.torsional_dps) * folded(section, frame, count, is_angle=True)
+        self._force = G * vibration.turning_g * folded_amplitude(section, frame, count, is_angle=False)
+        self._rate = math.radians(vibration.torsional_dps) * folded_amplitude(section, frame, count, is_angle=True)
         hertz = np.linspace(vibration.lowest_hz, vibration.highest_hz, ANGLE_STEPS)
         self.angle_std = math.radians(vibration.torsional_dps) * math.sqrt(float(np.mean((math.tau * hertz) ** -2)))
 
@@ -60,7 +60,7 @@ class Vibration:
         return sums
 
 
-def folded(section: RoughSection, frame: float, count: int, *, is_angle: bool) -> Array:
+def folded_amplitude(section: RoughSection, frame: float, count: int, *, is_angle: bool) -> Array:
     """Amplitude (count // 2 + 1,) by which white noise of the frames becomes a vibration of rms 1 at its source.
 
     The rate of an angle on the grid is the mean of two of its steps, and a frame lies anywhere between two samples.
@@ -68,7 +68,7 @@ def folded(section: RoughSection, frame: float, count: int, *, is_angle: bool) -
     from scipy.signal import freqz
 
     vibration, hertz = section.vibration, section.samples_hz
-    b, a = butterworth(section.sensor.low_pass_hz, hertz)
+    b, a = butterworth_coefficients(section.sensor.low_pass_hz, hertz)
     base = np.fft.rfftfreq(count, frame)
     power = np.zeros_like(base)
     most = math.ceil(vibration.highest_hz * frame) + 1

@@ -10,8 +10,8 @@ import numpy as np
 
 from sim.kernel import shared_body
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
+from sim.world.random_streams import RandomStream
 from sim.world.scenario_file import ScenarioFile
-from sim.world.streams import Stream
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,14 +24,14 @@ class GyroscopeConstants:
 
 def draw_gyroscope(imu: OneImu) -> GyroscopeConstants:
     """Constants of one gyroscope; small angles."""
-    g, random = imu.file.gyroscope, imu.random(Stream.GYRO)
+    g, random = imu.file.gyroscope, imu.random(RandomStream.GYRO)
     bias = np.radians(np.array(g.constant_bias_dps) + g.constant_bias_std_dps * random.standard_normal(3))
     matrix = math.radians(g.misalignment_std_deg) * random.standard_normal((3, 3))
     np.fill_diagonal(matrix, 1.0 + g.scale_factor_std * random.standard_normal(3))
     return GyroscopeConstants(bias, matrix)
 
 
-def distort(samples: ImuSamples, _: OneImu, drawn: GyroscopeConstants) -> None:
+def distort_rates(samples: ImuSamples, _: OneImu, drawn: GyroscopeConstants) -> None:
     """Scale, misalign and offset the rates."""
     samples.rate = samples.rate @ drawn.matrix.T + drawn.bias
 
@@ -64,7 +64,7 @@ GYROSCOPE = Disturbance(
         "gyroscope.misalignment_std_deg",
     ),
     ActsOn.SAMPLES,
-    distort,
+    distort_rates,
     draw_gyroscope,
     Compiled(tube=(("rate_bias", "f8", (3,)),), set_tube=set_bias, gains=gyroscope_gains, read=read_bias),  # rad/s
 )

@@ -9,7 +9,7 @@ import numpy as np
 
 from node.kernels.arithmetic.formats import Array
 from sim.kernel import kernel
-from sim.world.disturbance.philox import normals, uniforms
+from sim.world.disturbance.philox import fill_normal, fill_uniform
 
 WIDTH: Final = 3  # numbers of a lane
 CLOCK: Final = 9  # number, normal, of the clock of one hop, see ``sim.string.hops``
@@ -35,13 +35,13 @@ def count_numbers(free_lanes: int) -> int:
 def draw_numbers(counter: Array, key: Array, words: Array, drawn: Array, cycle: int, k: int) -> None:
     """Fill ``drawn`` (n,) for a tube and a cycle: all but the last ``UNIFORM`` normal."""
     counter[0], counter[1], counter[2] = np.uint64(cycle), np.uint64(k), np.uint64(0)
-    uniforms(counter, key, words, drawn)
-    normals(drawn[:-UNIFORM])
+    fill_uniform(counter, key, words, drawn)
+    fill_normal(drawn[:-UNIFORM])
 
 
 @kernel
 def draw_further(counter: Array, key: Array, words: Array, drawn: Array, cycle: int, k: int) -> None:
     """Fill ``drawn`` (n,) for the parts of a window of a tube and a cycle with standard normal numbers."""
     counter[0], counter[1], counter[2] = np.uint64(cycle), np.uint64(k), np.uint64(1)
-    uniforms(counter, key, words, drawn)
-    normals(drawn)
+    fill_uniform(counter, key, words, drawn)
+    fill_normal(drawn)

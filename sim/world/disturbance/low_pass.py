@@ -8,7 +8,7 @@ from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuS
 from sim.world.scenario_file import ScenarioFile
 
 
-def butterworth(low_pass: float, hertz: float) -> tuple[Array, Array]:
+def butterworth_coefficients(low_pass: float, hertz: float) -> tuple[Array, Array]:
     """Coefficients (3,) of the numerator and denominator of a low-pass of two poles at ``low_pass`` Hz."""
     from scipy.signal import butter  # a second that only a world with a filter pays
 
@@ -20,7 +20,7 @@ def low_passed(values: Array, low_pass: float, hertz: float) -> Array:
     """What a filter at ``low_pass`` Hz, at rest before the first, makes of ``values`` (n, m) at ``hertz`` samples/s."""
     from scipy.signal import lfilter, lfilter_zi
 
-    b, a = butterworth(low_pass, hertz)
+    b, a = butterworth_coefficients(low_pass, hertz)
     before = lfilter_zi(b, a)[:, None] * values[0]
     return np.asarray(lfilter(b, a, values, axis=0, zi=before)[0])
 

@@ -23,7 +23,7 @@ STEP: Final = 1.0 / 2.0**32
 
 
 @kernel
-def philox(counter: Array, key: Array, words: Array) -> None:
+def philox_words(counter: Array, key: Array, words: Array) -> None:
     """Fill ``words`` (4,) from ``counter`` (4,) and ``key`` (2,), 32-bit words in uint64."""
     a, b, c, d = counter[0], counter[1], counter[2], counter[3]
     k, m = key[0], key[1]
@@ -35,23 +35,23 @@ def philox(counter: Array, key: Array, words: Array) -> None:
 
 
 @kernel
-def uniforms(counter: Array, key: Array, words: Array, drawn: Array) -> None:
+def fill_uniform(counter: Array, key: Array, words: Array, drawn: Array) -> None:
     """Fill ``drawn`` (n,) with numbers inside 0..1, n a multiple of four; ``counter``'s last word counts from 0.
 
     Parameters
     ----------
-    counter, key : see ``philox``; the counter's last word is overwritten
+    counter, key : see ``philox_words``; the counter's last word is overwritten
     words : (4,) work space
     """
     for block in range(drawn.shape[0] // 4):
         counter[3] = np.uint64(block)
-        philox(counter, key, words)
+        philox_words(counter, key, words)
         for k in range(4):
             drawn[4 * block + k] = (np.float64(words[k]) + 0.5) * STEP
 
 
 @kernel
-def normals(drawn: Array) -> None:
+def fill_normal(drawn: Array) -> None:
     """Turn pairs of uniform numbers (n,) into standard normal ones in place, n even. Source: Box and Muller 1958.
 
     The farthest is at 6.7 sigma, where the smallest of 32-bit numbers ends.

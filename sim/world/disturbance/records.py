@@ -11,9 +11,9 @@ from typing import Final
 import numpy as np
 
 from node.kernels.arithmetic.formats import Array
+from sim.world.disturbance.disturbance_table import TABLE
 from sim.world.disturbance.frame_layout import CIRCLE, SLACK_RATE, SUMS, TORSIONAL
 from sim.world.disturbance.row import Compiled, OneImu
-from sim.world.disturbance.table import TABLE
 from sim.world.scenario_file import ScenarioFile
 
 FORMS: Final[tuple[Compiled, ...]] = tuple(row.compiled for row in TABLE if row.compiled is not None)

@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from node.kernels.arithmetic.formats import PERIOD
+from sim.world.random_streams import RandomStream, random_stream
 from sim.world.rough_section import RoughSection
 from sim.world.scenario_file import ScenarioFile
-from sim.world.section import Section
-from sim.world.streams import Stream, stream
+from sim.world.section import ScenarioSection
 from sim.world.truth import TubeTruth
 
 Array = npt.NDArray[np.float64]
@@ -75,11 +75,11 @@ class OneImu:
             raise ValueError("rough: expected a rough world")
         return self.file.rough
 
-    def random(self, purpose: Stream, *further: int) -> np.random.Generator:
+    def random(self, purpose: RandomStream, *further: int) -> np.random.Generator:
         """Stream of a purpose, one generator for the whole reading."""
         key = (int(purpose), *further)
         if key not in self._randoms:
-            self._randoms[key] = stream(self.seed, purpose, *self._key, *further)
+            self._randoms[key] = random_stream(self.seed, purpose, *self._key, *further)
         return self._randoms[key]
 
     def section_of(self, row: Disturbance) -> Any:
@@ -202,7 +202,7 @@ class Disturbance:
     draw: Callable[[OneImu], Any] | None = None
     compiled: Compiled | None = None
     beyond: Callable[[ScenarioFile], dict[str, bool]] | None = None
-    section: type[Section] | None = None
+    section: type[ScenarioSection] | None = None
 
     def section_of(self, file: ScenarioFile) -> Any:
         """Its section in a scenario, defaults where that has none."""

@@ -10,8 +10,8 @@ import math
 import numpy as np
 
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu, TubeMotion
+from sim.world.random_streams import RandomStream
 from sim.world.scenario_file import ScenarioFile
-from sim.world.streams import Stream
 
 G = 9.80665  # m/s^2, of a range and of a vibration
 BAND = ("rough.vibration.lowest_hz", "rough.vibration.highest_hz")
@@ -33,26 +33,26 @@ def twist_to_and_fro(motion: TubeMotion, imu: OneImu, _: None) -> None:
     if section.torsional_dps == 0.0:
         return
     step = float(motion.t[1] - motion.t[0])
-    random = imu.random(Stream.ROUGH_VIBRATION, 0)
+    random = imu.random(RandomStream.ROUGH_VIBRATION, 0)
     rate = band_noise(random, len(motion.t), 1.0 / step, section.lowest_hz, section.highest_hz)
     angle = np.cumsum(rate) * step
     motion.angle = motion.angle + math.radians(section.torsional_dps) * motion.driven * (angle - angle.mean())
 
 
-def shake(samples: ImuSamples, imu: OneImu, _: None) -> None:
+def shake_forces(samples: ImuSamples, imu: OneImu, _: None) -> None:
     """Add the vibration of the forces, and keep it for what a gyroscope makes of it."""
     section = imu.rough.vibration
     size = np.where(samples.turning > 0.0, section.turning_g, section.resting_g)
     if not np.any(size > 0.0):
         return
     hertz = 1.0 / float(samples.t[1] - samples.t[0])
-    random = imu.random(Stream.ROUGH_VIBRATION, 1)
+    random = imu.random(RandomStream.ROUGH_VIBRATION, 1)
     noise = [band_noise(random, len(size), hertz, section.lowest_hz, section.highest_hz) for _ in range(3)]
     samples.shaken = size[:, None] * np.stack(noise, axis=1)
     samples.force = samples.force + G * samples.shaken
 
 
-def rectify(samples: ImuSamples, imu: OneImu, _: None) -> None:
+def rectify_vibration(samples: ImuSamples, imu: OneImu, _: None) -> None:
     """Add what vibration is seen as by each axis of a gyroscope, the square of its size."""
     if samples.shaken is not None:
         seen = math.radians(imu.rough.sensor.rectification_dps_per_g2) * np.sum(samples.shaken**2, axis=1)
@@ -75,8 +75,8 @@ VIBRATION = Disturbance(
     "vibration",
     ("rough.vibration.turning_g", "rough.vibration.resting_g", *BAND),
     ActsOn.GRID,
-    shake,
+    shake_forces,
     compiled=Compiled(),
     beyond=shakes_at_rest,
 )
-RECTIFICATION = Disturbance("rectification", ("rough.sensor.rectification_dps_per_g2",), ActsOn.GRID, rectify)
+RECTIFICATION = Disturbance("rectification", ("rough.sensor.rectification_dps_per_g2",), ActsOn.GRID, rectify_vibration)

@@ -11,8 +11,8 @@ from node.kernels.arithmetic.formats import PERIOD
 from sim.kernel import kernel, shared_body
 from sim.world.disturbance.lanes import Lane
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
+from sim.world.random_streams import RandomStream
 from sim.world.scenario_file import ScenarioFile
-from sim.world.streams import Stream
 
 
 def gauss_markov(random: np.random.Generator, count: int, std: Array, tau: float, step: float) -> Array:
@@ -23,27 +23,27 @@ def gauss_markov(random: np.random.Generator, count: int, std: Array, tau: float
     phi = math.exp(-step / tau)
     draws = random.standard_normal((count, 3))
     draws[1:] *= math.sqrt(1.0 - phi * phi)
-    follow(draws, phi)
+    follow_markov(draws, phi)
     return draws * std
 
 
 @kernel
-def follow(draws: Array, phi: float) -> None:
+def follow_markov(draws: Array, phi: float) -> None:
     """Add to every row of ``draws`` (n, m) its part ``phi`` of the row before, in place."""
     for k in range(1, draws.shape[0]):
         for j in range(draws.shape[1]):
             draws[k, j] += phi * draws[k - 1, j]
 
 
-def wandering(imu: OneImu, count: int, period: float) -> Array:
+def wandering_bias(imu: OneImu, count: int, period: float) -> Array:
     """Bias (count, 3) rad/s of samples that are ``period`` (s) apart."""
     std = np.radians(np.array([imu.noise * x for x in imu.file.gyroscope.bias_std_dps]))
-    return gauss_markov(imu.random(Stream.GYRO), count, std, imu.file.gyroscope.bias_tau_s, period)
+    return gauss_markov(imu.random(RandomStream.GYRO), count, std, imu.file.gyroscope.bias_tau_s, period)
 
 
 def wander_off(samples: ImuSamples, imu: OneImu, _: None) -> None:
     """Add what wanders."""
-    samples.rate = samples.rate + wandering(imu, len(samples.t), samples.period)
+    samples.rate = samples.rate + wandering_bias(imu, len(samples.t), samples.period)
 
 
 def set_wander(shared: Any, file: ScenarioFile) -> None:

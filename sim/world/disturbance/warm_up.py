@@ -13,7 +13,7 @@ from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuS
 from sim.world.scenario_file import ScenarioFile
 
 
-def warmth(imu: OneImu, t: Array) -> Array:
+def warm_fraction(imu: OneImu, t: Array) -> Array:
     """How far (n,), 0..1, the sensor has warmed up by rig times ``t`` (n,), s."""
     since = np.maximum(t - imu.cold_at, 0.0)
     return np.asarray(1.0 - np.exp(-since / imu.rough.sensor.warm_up_s))
@@ -22,7 +22,7 @@ def warmth(imu: OneImu, t: Array) -> Array:
 def warm_up(samples: ImuSamples, imu: OneImu, _: None) -> None:
     """Add the drift of each gyroscope."""
     if imu.file.rough is not None:
-        drift = math.radians(imu.rough.sensor.warm_up_dps) * warmth(imu, samples.t)
+        drift = math.radians(imu.rough.sensor.warm_up_dps) * warm_fraction(imu, samples.t)
         samples.rate = samples.rate + drift[:, None]
 
 

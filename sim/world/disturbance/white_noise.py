@@ -12,13 +12,13 @@ from node.kernels.record.filter_record import PARTS
 from sim.kernel import kernel, shared_body
 from sim.world.disturbance.lanes import Lane
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
+from sim.world.random_streams import RandomStream
 from sim.world.scenario_file import GyroSection, ScenarioFile
-from sim.world.streams import Stream
 
 SAMPLE_RATE_HZ = 65.0  # of the gyroscope, whose single sample has the noise of this band. Source: thesis Table V.1
 
 
-def densities(gyroscope: GyroSection, period: float) -> tuple[float, float, float]:
+def noise_densities(gyroscope: GyroSection, period: float) -> tuple[float, float, float]:
     """Noise (deg/s/sqrt(Hz)) of means over ``period`` (s), or of single samples as if they were such means."""
     if not gyroscope.instantaneous:
         return gyroscope.noise_dps_rthz
@@ -29,9 +29,9 @@ def densities(gyroscope: GyroSection, period: float) -> tuple[float, float, floa
 
 def add_white(samples: ImuSamples, imu: OneImu, _: None) -> None:
     """Add the noise of each sample."""
-    density = np.array([imu.noise * x for x in densities(imu.file.gyroscope, samples.period)])
+    density = np.array([imu.noise * x for x in noise_densities(imu.file.gyroscope, samples.period)])
     white = np.radians(density) / math.sqrt(samples.period)
-    samples.rate = samples.rate + white * imu.random(Stream.GYRO).standard_normal(samples.rate.shape)
+    samples.rate = samples.rate + white * imu.random(RandomStream.GYRO).standard_normal(samples.rate.shape)
 
 
 def set_white(shared: Any, file: ScenarioFile) -> None:

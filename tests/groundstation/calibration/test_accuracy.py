@@ -14,7 +14,7 @@ from groundstation.calibration.accuracy import (
     relative_error,
     sensor_characteristic,
 )
-from groundstation.calibration.errors import CalibrationError
+from telemetry.errors import CalibrationError
 
 PRESET_DEG = np.array([0.5, 1.0, 1.5, 2.5, 3.5, 5.0, 10.0])
 MEAN_DEG = np.array([0.488, 1.006, 1.480, 2.478, 3.429, 4.982, 9.966])

@@ -18,8 +18,8 @@ from groundstation.calibration.allan_analysis import (
     relative_standard_error,
 )
 from groundstation.calibration.allan_fit import allan_design_matrix, fit_allan_variances, spectral_moments
-from groundstation.calibration.errors import CalibrationError
 from sim.instruments.static_records import StaticNoise, static_record
+from telemetry.errors import CalibrationError
 
 RATE = 20.0
 MPU_X = StaticNoise(white=8.9e-3, flicker=7.9e-3)

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from groundstation.calibration.attitudes import fit_attitudes, fit_free_yaw, true_vectors
 from groundstation.calibration.calibration_records import read_attitudes, read_turn_table
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.turntable import as_observations, turntable_alignment
+from telemetry.errors import CalibrationError
 
 DATA = Path(__file__).parents[2] / "data" / "calibration"
 VN100_MATRIX = [[-3.69569, 9.05279, 0.83102], [-9.05855, -3.69281, -0.86393], [-0.01440, 0.29226, 9.86523]]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from groundstation.calibration import block
 from groundstation.calibration.block import Calibration, Provenance, from_json, model_of, to_json
-from groundstation.calibration.errors import CalibrationError
+from telemetry.errors import CalibrationError
 
 MATRIX = np.array([[1.01, 0.02, 0.0], [-0.01, 0.98, 0.03], [0.0, 0.01, 1.0]])
 PROVENANCE = Provenance(

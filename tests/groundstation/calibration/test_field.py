@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.field_calibration import (
     Rest,
     calibrate_accelerometer,
@@ -17,6 +16,7 @@ from groundstation.calibration.field_calibration import (
     true_specific_forces,
 )
 from telemetry import frozen
+from telemetry.errors import CalibrationError
 from telemetry.messages import Matrix3, StaticRecord
 
 G, DAY = 9.81, "2024-05-31"

@@ -9,12 +9,12 @@ import pytest
 
 from groundstation.calibration.attitudes import fit_attitudes, true_vectors
 from groundstation.calibration.coverage import coverage_factor
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.intervals import Interval, Spread, coverage_interval
 from groundstation.calibration.jig import Jig, cross_product_matrices, reading_errors, settings_of, spreads_of
 from groundstation.calibration.mwd_solve import solve_accelerometers
 from groundstation.calibration.turntable import SETTINGS, as_observations
 from sim.instruments.mwd_jig import Heating, draw_tool, make_design, measure_tool
+from telemetry.errors import CalibrationError
 
 MATRIX = np.array([[9.9, 0.2, -0.1], [-0.3, 9.7, 0.15], [0.05, -0.25, 9.85]])
 BIAS = np.array([0.1, -0.2, 0.3])

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.mwd_model import (
     LocalModel,
     Triad,
@@ -23,6 +22,7 @@ from groundstation.calibration.mwd_model import (
     vectors_of_volts,
 )
 from sim.instruments.mwd_jig import DIP, FIELD, Heating, draw_tool, make_design, measure_tool, true_vectors
+from telemetry.errors import CalibrationError
 
 DEG = math.pi / 180.0
 TINY = 1e-30  # imaginary, of a complex step

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.mwd_cost import Problem
 from groundstation.calibration.mwd_design import parameter_covariance, refuse_open
 from groundstation.calibration.mwd_model import nominal_triad, tool_face, vectors_of_volts
@@ -18,6 +17,7 @@ from groundstation.calibration.mwd_record import accelerometer_record, magnetome
 from groundstation.calibration.mwd_solve import solve_accelerometers, solve_magnetometers
 from sim.instruments.mwd_jig import DIP, FIELD, Heating, MwdTool, draw_tool, make_design, measure_tool
 from sim.studies.mwd.run import ToolOutcome, calibrate_tool, run_study
+from telemetry.errors import CalibrationError
 
 TOOLS = 20
 FEW = 5  # of them in `make test`

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.mwd_model import Readings, gravity_inclination, magnetic_azimuth
 from groundstation.calibration.quality import TOOL_FACES, judge_readings
 from sim.instruments.mwd_jig import true_vectors
+from telemetry.errors import CalibrationError
 
 FACES = 2.0 * math.pi * np.arange(TOOL_FACES) / TOOL_FACES
 DEG = math.pi / 180.0

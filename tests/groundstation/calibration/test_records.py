@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from groundstation.calibration.calibration_records import read_attitudes, read_static, read_turn_table
-from groundstation.calibration.errors import CalibrationError
-from telemetry.errors import InputError
+from telemetry.errors import CalibrationError, InputError
 
 DATA = Path(__file__).parents[2] / "data" / "calibration"
 POS_NEG = "axis,x_pos,x_neg,y_pos,y_neg,z_pos,z_neg"

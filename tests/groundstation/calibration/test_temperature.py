@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.calibration import attitudes
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.temperature import TemperatureModel, fit_temperature_polynomials, from_datasheet
+from telemetry.errors import CalibrationError
 
 SIX = np.concatenate([np.eye(3), -np.eye(3)])
 TEMPERATURES = np.array([0.0, 20.0, 40.0, 60.0])

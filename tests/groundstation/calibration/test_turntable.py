@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.calibration.calibration_records import STANDARD_GRAVITY, read_turn_table
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.turntable import as_observations, check_invertible, correct_readings, turntable_alignment
+from telemetry.errors import CalibrationError
 
 DATA = Path(__file__).parents[2] / "data" / "calibration"
 A1_MATRIX = [

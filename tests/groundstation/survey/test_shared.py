@@ -47,7 +47,7 @@ def common_yaw_var(one: Direction, other: Direction) -> float:
 def yaw_only(errors: SharedErrors, tube: int, above: list[int] | None, joints: float, mount: float = 0.0) -> Direction:
     """Reading whose yaw errors are so large in unit of its slope that the common variance reads in rad^2."""
     size = float(stop().by_yaw @ stop().by_yaw)
-    return errors.reading(stop(), tube, above, (joints + mount) / size**2, mount / size**2, 0.0)
+    return errors.direction_of(stop(), tube, above, (joints + mount) / size**2, mount / size**2, 0.0)
 
 
 def by_kind(errors: SharedErrors, shared: np.ndarray) -> dict[str, np.ndarray]:
@@ -106,8 +106,8 @@ def test_an_unknown_order_is_one_error_that_all_share() -> None:
 
 def test_biases_of_an_accelerometer_are_those_of_its_tube() -> None:
     errors, resolved, std = SharedErrors(), stop(), 3e-3
-    one, again = (errors.reading(resolved, 1, [2], 0.0, 0.0, std) for _ in range(2))
-    other = errors.reading(resolved, 2, [], 0.0, 0.0, std)
+    one, again = (errors.direction_of(resolved, 1, [2], 0.0, 0.0, std) for _ in range(2))
+    other = errors.direction_of(resolved, 2, [], 0.0, 0.0, std)
     np.testing.assert_allclose(one.shared @ one.shared.T, std**2 * resolved.by_force @ resolved.by_force.T, rtol=1e-12)
     np.testing.assert_array_equal(one.shared, again.shared)
     assert not np.any(one.shared @ other.shared[:, : one.shared.shape[1]].T)
@@ -115,14 +115,14 @@ def test_biases_of_an_accelerometer_are_those_of_its_tube() -> None:
 
 def test_a_reading_met_again_needs_no_new_columns() -> None:
     errors = SharedErrors()
-    first = errors.reading(stop(), 1, [2, 3], 1e-4, 1e-5, 1e-3)
-    count = len(errors)
+    first = errors.direction_of(stop(), 1, [2, 3], 1e-4, 1e-5, 1e-3)
+    count = errors.count
     assert first.shared.shape == (2, count)
-    errors.reading(stop(), 1, [2, 3], 2e-4, 1e-5, 1e-3)
-    assert len(errors) == count
-    later = errors.reading(stop(), 2, [3], 1e-4, 1e-5, 1e-3)
-    assert later.shared.shape == (2, len(errors))
-    assert len(errors) > count
+    errors.direction_of(stop(), 1, [2, 3], 2e-4, 1e-5, 1e-3)
+    assert errors.count == count
+    later = errors.direction_of(stop(), 2, [3], 1e-4, 1e-5, 1e-3)
+    assert later.shared.shape == (2, errors.count)
+    assert errors.count > count
 
 
 @given(
@@ -135,7 +135,7 @@ def test_the_constant_yaw_variance_of_a_reading_is_all_there_and_no_more(
     systematic_var: float, mount_var: float, above: list[int] | None, yaw: float
 ) -> None:
     resolved, errors = stop(0.3, 2.0, yaw), SharedErrors()
-    lean = errors.reading(resolved, 1, above, systematic_var, mount_var, 0.0)
+    lean = errors.direction_of(resolved, 1, above, systematic_var, mount_var, 0.0)
     expected = systematic_var * np.outer(resolved.by_yaw, resolved.by_yaw)
     np.testing.assert_allclose(lean.shared @ lean.shared.T, expected, rtol=1e-9, atol=1e-20)
     np.testing.assert_array_equal(lean.lean, resolved.direction.lean)
@@ -158,7 +158,7 @@ def test_the_constant_yaw_variance_of_a_reading_is_all_there_and_no_more(
 @pytest.mark.slow
 def test_the_kinds_add_up_to_the_whole(readings: list[tuple[int, list[int] | None, float, float, float]]) -> None:
     errors = SharedErrors()
-    leans = [errors.reading(stop(), *reading) for reading in readings]
+    leans = [errors.direction_of(stop(), *reading) for reading in readings]
     fused = fuse_by_bayes(leans)
     for shared in (leans[0].shared, leans[-1].shared, fused.shared):
         kinds = by_kind(errors, shared)
@@ -170,7 +170,7 @@ def test_the_kinds_add_up_to_the_whole(readings: list[tuple[int, list[int] | Non
 def test_each_kind_holds_what_is_of_its_kind() -> None:
     errors, resolved = SharedErrors(), stop()
     yaw = resolved.by_yaw**2
-    kinds = by_kind(errors, errors.reading(resolved, 1, [2, 3], 5e-4, 2e-4, 1e-3).shared)
+    kinds = by_kind(errors, errors.direction_of(resolved, 1, [2, 3], 5e-4, 2e-4, 1e-3).shared)
     np.testing.assert_allclose(kinds["mounts"], 2e-4 * yaw, rtol=1e-9)
     np.testing.assert_allclose(kinds["joints"], 3e-4 * yaw, rtol=1e-9)
     biases = 1e-6 * (resolved.by_force**2).sum(axis=1)
@@ -251,7 +251,7 @@ def surveyed(drawn: Drawn, errors: SharedErrors) -> Trajectory:
             told = yaw + drawn.yaw_error(tube, above) + float(drawn.noise(YAW_STD)[0])
             resolved = resolve_direction(force, FORCE_STD**2 * np.eye(3), told, YAW_STD**2)
             systematic_var = MOUNT_STD**2 + (len(above) + 1) * JOINT_STD**2
-            readings[station].append(errors.reading(resolved, tube, above, systematic_var, MOUNT_STD**2, BIAS_STD))
+            readings[station].append(errors.direction_of(resolved, tube, above, systematic_var, MOUNT_STD**2, BIAS_STD))
     trajectory = Trajectory()
     for md, found in zip(MDS, readings, strict=True):
         trajectory.append(md, fuse_by_bayes(found))

@@ -21,8 +21,8 @@ from telemetry.messages import (
     Event,
     Hello,
     ImuMean,
-    Mode,
     NodeFlag,
+    NodeMode,
     NodeState,
     Receipt,
     Reply,
@@ -33,7 +33,7 @@ from telemetry.messages import (
     TimeRequest,
     UploadPhase,
 )
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 
 FILE = Path(__file__).with_name("payloads.json")
 EACH = 3  # recorded messages of one kind
@@ -42,16 +42,16 @@ MADE: tuple[Any, ...] = (
     Aiding(1.25, 1e-8, 2e-6, -0.5, 0.1, 1234.5, 77, 3),
     Aiding(0, 1e-8, 0, 0, 0, 1234, 2**33 + 1, 0),
     Aiding(math.tau, 1e-8, 2e-6, -0.5, 0.1, 1234.5, 77, 3, torque=850.0, torsion_var=1e-7, under_torque=True),
-    Hello(BASE, 12, HOPS_UNKNOWN, Mode.BOOT, 1.0),
-    Hello(250, 2**32 - 1, 250, Mode.FAULT, 0),
+    Hello(BASE, 12, HOPS_UNKNOWN, NodeMode.BOOT, 1.0),
+    Hello(250, 2**32 - 1, 250, NodeMode.FAULT, 0),
     TimeRequest(1000.125),
     TimeReply(1000.125, 2000.5, 2000.5, 990.25, 1.00001, 1e-9),
     NodeState(
-        3, 1000.5, 2, Mode.TRACKING, 1.5, 1e-6, 2e-6, (1e-3, -2e-3, 3e-3), 1e-4, -1e-4, 1e-7, math.inf, 1e-9,
+        3, 1000.5, 2, NodeMode.TRACKING, 1.5, 1e-6, 2e-6, (1e-3, -2e-3, 3e-3), 1e-4, -1e-4, 1e-7, math.inf, 1e-9,
         NodeFlag.RESTORED | NodeFlag.AIDING_OLD, 70, 1,
     ),
     NodeState(
-        3, 1000, 2, Mode.STILL, 1, 0, 0, (0, 0, 0), 0, 0, 0, 0.25, 0, NodeFlag.NONE, 2**53, 0, 7, bytes(range(8)),
+        3, 1000, 2, NodeMode.STILL, 1, 0, 0, (0, 0, 0), 0, 0, 0, 0.25, 0, NodeFlag.NONE, 2**53, 0, 7, bytes(range(8)),
         (1e-3, -2e-3, 1e-5),
     ),
     SurveyMeasurement(
@@ -80,5 +80,5 @@ def recorded(database: Path) -> list[str]:
 
 
 if __name__ == "__main__":
-    payloads = {"made": [encode(message).hex() for message in MADE], "recorded": recorded(Path(sys.argv[1]))}
+    payloads = {"made": [encode_message(message).hex() for message in MADE], "recorded": recorded(Path(sys.argv[1]))}
     FILE.write_text(json.dumps(payloads, indent=1) + "\n")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from groundstation.service.alarms.crew_alarms import State as AlarmState
+from groundstation.service.alarms.crew_alarms import AlarmState
 from groundstation.service.alarms.rig_alarms import KINDS, Level
 from groundstation.service.alarms.verdict import WINDS
 from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class

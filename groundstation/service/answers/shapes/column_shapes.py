@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from groundstation.service.alarms.verdict import WINDS, Doubt, Word
+from groundstation.service.alarms.verdict import WINDS, VerdictDoubt, Word
 from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
 from groundstation.service.answers.shapes.hole_shapes import MeasuredDepth
 
@@ -114,7 +114,7 @@ class Verdict:
     line: Annotated[str, "all of it in a line"]
     todo: Annotated[str, "what to do, in a line"]
     why: Annotated[list[str], "what it rests on, or why it is not known"]
-    doubts: Annotated[list[str], "why it is not known, as words", OneOf(*(doubt.value for doubt in Doubt))]
+    doubts: Annotated[list[str], "why it is not known, as words", OneOf(*(doubt.value for doubt in VerdictDoubt))]
     bit_md_m: Annotated[float | None, "measured depth of the bit"]
     target_m: Annotated[float, "length of the design axis"]
     what: Annotated[str | None, "which deviation decided", OneOf("deviation", "projection")]

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
 from groundstation.service.answers.shapes.string_shapes import Tube
 from groundstation.service.orders.order_book import OrderState
-from groundstation.service.orders.recalibration.recalibration_progress import Phase, Stage
+from groundstation.service.orders.recalibration.recalibration_progress import RecalibrationStage, TubePhase
 
 
 @answer_class
@@ -78,7 +78,7 @@ class TubeCalibration:
     """Calibration in the field of one tube."""
 
     tube: Tube
-    phase: Annotated[str, "how far it is", OneOf(*Phase)]
+    phase: Annotated[str, "how far it is", OneOf(*TubePhase)]
     detail: Annotated[str, "why it is refused, or what is missing"]
     records: Annotated[int, "at rest so far"]
     asked: Annotated[int, "records asked for"]
@@ -99,7 +99,7 @@ class TubeCalibration:
 class RecalibrationAnswer:
     """Calibration in the field: how far, and what it found."""
 
-    state: Annotated[str, "how far it is", OneOf(*Stage)]
+    state: Annotated[str, "how far it is", OneOf(*RecalibrationStage)]
     proposal: Annotated[str, "hash to confirm"]
     attitudes: list[RestAttitude]
     tubes: list[TubeCalibration]

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from groundstation.service.alarms.rig_alarms import Health
 from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
-from telemetry.messages import Mode, NodeFlag, Severity
+from telemetry.messages import NodeFlag, NodeMode, Severity
 
 Tube = Annotated[int, "number of the tube"]
 Sequence = Annotated[int, "the tube's number of it"]
@@ -87,7 +87,7 @@ class NodeAnswer:
     age_s: Annotated[float | None, "since then"]
     stale: Annotated[bool, "silent for too long"]
     hops: Annotated[int, "distance from the encoder in tubes, -1 unknown"]
-    mode: Annotated[str, "execution state", OneOf(*(mode.name.lower() for mode in Mode))]
+    mode: Annotated[str, "execution state", OneOf(*(mode.name.lower() for mode in NodeMode))]
     yaw_deg: Yaw
     sigma_yaw_deg: YawSigma
     sigma_systematic_deg: SystematicSigma

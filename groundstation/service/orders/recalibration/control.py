@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.calibration.block import from_json, write_calibration
-from groundstation.calibration.errors import CalibrationError
 from groundstation.errors import SelectorError
 from groundstation.service.disk.ground_store import Store
 from groundstation.service.orders.recalibration.procedure import FieldProcedure
-from groundstation.service.orders.recalibration.recalibration_progress import Progress
+from groundstation.service.orders.recalibration.recalibration_progress import RecalibrationProgress
 from groundstation.survey.fusion.force_biases import SurveyedBiases
+from telemetry.errors import CalibrationError
 
 
 class Recalibration:
@@ -43,7 +43,7 @@ class Recalibration:
         self._cancel_upload = cancel_upload
         self._biases = biases
         kept = store.progress()
-        procedure.restore(Progress.from_json(kept) if kept else Progress(), store.blocks())
+        procedure.restore(RecalibrationProgress.from_json(kept) if kept else RecalibrationProgress(), store.blocks())
         self._kept = kept
 
     def step(self, action: str, arguments: Mapping[str, Any], rig_now: float, string: list[int]) -> None:

@@ -12,18 +12,18 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.field_calibration import Rest
 from groundstation.errors import SelectorError
 from groundstation.service.orders.recalibration.recalibration_progress import (
     Attitude,
-    Phase,
-    Progress,
-    Stage,
+    RecalibrationProgress,
+    RecalibrationStage,
+    TubePhase,
     TubeProgress,
 )
-from groundstation.service.orders.recalibration.solution import Proposal, propose, propose_bias
+from groundstation.service.orders.recalibration.solution import Proposal, propose_bias, propose_block
 from groundstation.survey.fusion.force_biases import SurveyedBiases
+from telemetry.errors import CalibrationError
 from telemetry.messages import BlockStatus, NodeState, Reply, Scalar, StaticRecord, UploadPhase
 from telemetry.parameters import SHORT_HASH, ParameterBlock
 
@@ -31,7 +31,10 @@ REFUSED_AGAIN = 3.0  # s after which a tube that could not is asked again
 SILENT_AGAIN = 15.0  # s, beyond the length of a record, after which one that did not answer is
 CLOCK_TOLERANCE = 1.0  # s, by which rig time as known here may be ahead
 OVERTAKEN = 10  # cycles by which a state may be overtaken on its way
-BEFORE_UPLOAD, IN_UPLOAD = (Stage.COLLECTING, Stage.SOLVED), (Phase.UPLOADING, Phase.VERIFYING)
+BEFORE_UPLOAD, IN_UPLOAD = (
+    (RecalibrationStage.COLLECTING, RecalibrationStage.SOLVED),
+    (TubePhase.UPLOADING, TubePhase.VERIFYING),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +56,7 @@ class FieldProcedure:
     """
 
     def __init__(self, gravity: float) -> None:
-        self.progress = Progress()
+        self.progress = RecalibrationProgress()
         self.blocks: dict[str, ParameterBlock] = {}  # that this ground station has sent, by their hash
         self._gravity = gravity
         self._records: dict[int, StaticRecord] = {}  # by the command that asked for them
@@ -61,13 +64,13 @@ class FieldProcedure:
         self._questions: dict[int, int] = {}  # command for the block in use: tube
         self._cycles: dict[int, int] = {}
 
-    def restore(self, progress: Progress, blocks: Iterable[ParameterBlock]) -> None:
+    def restore(self, progress: RecalibrationProgress, blocks: Iterable[ParameterBlock]) -> None:
         """Go on after a restart; what was on its way is asked for again."""
         self.progress = progress
         self.blocks = {block.sha256().hex(): block for block in blocks}
         for tube in progress.tubes.values():
             if tube.phase in IN_UPLOAD:
-                tube.phase = Phase.CONFIRMED
+                tube.phase = TubePhase.CONFIRMED
 
     def begin(self, tubes: list[int]) -> None:
         """Start with these tubes.
@@ -78,12 +81,14 @@ class FieldProcedure:
             When there is no tube, or another calibration has not ended.
         """
         p = self.progress
-        if p.stage in (*BEFORE_UPLOAD, Stage.UPLOADING) and p.attitudes:
-            raise SelectorError(f"a calibration of tubes {_list(p.tubes)} is {p.stage}; expected action=cancel before")
+        if p.stage in (*BEFORE_UPLOAD, RecalibrationStage.UPLOADING) and p.attitudes:
+            raise SelectorError(
+                f"a calibration of tubes {_list_tubes(p.tubes)} is {p.stage}; expected action=cancel before"
+            )
         if not tubes:
             raise SelectorError("tubes: expected those of the string, no tube is known")
         begun = {tube: TubeProgress(tube) for tube in sorted(set(tubes))}
-        self.progress = Progress(Stage.COLLECTING, [], begun, mixed=p.mixed)
+        self.progress = RecalibrationProgress(RecalibrationStage.COLLECTING, [], begun, mixed=p.mixed)
         self._records.clear()
         self._again.clear()
         self._questions.clear()
@@ -98,11 +103,17 @@ class FieldProcedure:
         """
         self._expect(*BEFORE_UPLOAD)
         p = self.progress
-        p.stage, p.proposal = Stage.COLLECTING, ""
+        p.stage, p.proposal = RecalibrationStage.COLLECTING, ""
         self._leave(rig_now)
         p.attitudes.append(Attitude(pitch, roll, seconds, rig_now))
         for tube in p.tubes.values():
-            tube.phase, tube.proposed, tube.found, tube.calibration, tube.detail = Phase.COLLECTING, "", None, "", ""
+            tube.phase, tube.proposed, tube.found, tube.calibration, tube.detail = (
+                TubePhase.COLLECTING,
+                "",
+                None,
+                "",
+                "",
+            )
             self._again.pop(tube.tube, None)
 
     def solve(self, day: str, rig_now: float) -> None:
@@ -115,7 +126,7 @@ class FieldProcedure:
         """
         self._expect(*BEFORE_UPLOAD)
         self._leave(rig_now)
-        self._propose_all(lambda tube, before: propose(self._rests(tube), before, self._gravity, day))
+        self._propose_all(lambda tube, before: propose_block(self._rests(tube), before, self._gravity, day))
 
     def propose_biases(self, surveyed: SurveyedBiases, day: str) -> None:
         """Propose blocks with the accelerometer biases that the surveys of the hole show.
@@ -144,12 +155,12 @@ class FieldProcedure:
             try:
                 self._propose(tube, made)
             except CalibrationError as error:
-                tube.phase, tube.detail, tube.proposed, tube.found = Phase.REFUSED, str(error), "", None
+                tube.phase, tube.detail, tube.proposed, tube.found = TubePhase.REFUSED, str(error), "", None
         hashes = [block.sha256() for tube in p.tubes.values() if (block := tube.block) is not None]
         if not hashes:
-            p.stage = Stage.COLLECTING
+            p.stage = RecalibrationStage.COLLECTING
             raise SelectorError("; ".join(f"tube {t.tube}: {t.detail}" for t in p.tubes.values()))
-        p.stage, p.proposal = Stage.SOLVED, hashlib.sha256(b"".join(hashes)).hexdigest()
+        p.stage, p.proposal = RecalibrationStage.SOLVED, hashlib.sha256(b"".join(hashes)).hexdigest()
 
     def proposed(self, proposal: str) -> list[tuple[ParameterBlock, str]]:
         """Blocks that ``proposal`` names, each with the text of its calibration; empty when they are under way.
@@ -160,21 +171,21 @@ class FieldProcedure:
             When nothing is proposed, or something else than what the operator saw.
         """
         p = self.progress
-        if p.stage is Stage.UPLOADING and proposal == p.proposal:
+        if p.stage is RecalibrationStage.UPLOADING and proposal == p.proposal:
             return []
-        self._expect(Stage.SOLVED)
+        self._expect(RecalibrationStage.SOLVED)
         if proposal != p.proposal:
             raise SelectorError(f"proposal: expected {p.proposal}, got {proposal!r:.80}; nothing is uploaded")
         return [(block, tube.calibration) for tube in p.tubes.values() if (block := tube.block) is not None]
 
     def confirm(self) -> None:
         """Upload what was proposed, unless that is under way."""
-        if self.progress.stage is not Stage.SOLVED:
+        if self.progress.stage is not RecalibrationStage.SOLVED:
             return
-        self.progress.stage = Stage.UPLOADING
+        self.progress.stage = RecalibrationStage.UPLOADING
         for tube in self.progress.tubes.values():
             if (block := tube.block) is not None:
-                tube.phase = Phase.CONFIRMED
+                tube.phase = TubePhase.CONFIRMED
                 self.blocks[block.sha256().hex()] = block
 
     def cancel(self) -> None:
@@ -185,20 +196,20 @@ class FieldProcedure:
         SelectorError
             When there is nothing to end.
         """
-        self._expect(*BEFORE_UPLOAD, Stage.UPLOADING)
-        self.progress.stage = Stage.IDLE
+        self._expect(*BEFORE_UPLOAD, RecalibrationStage.UPLOADING)
+        self.progress.stage = RecalibrationStage.IDLE
 
     def uploads_to(self, tube: int) -> bool:
         """Whether a tube is to get its block, or to confirm that it has it."""
         progress = self.progress.tubes.get(tube)
-        phases = (Phase.CONFIRMED, *IN_UPLOAD)
-        return progress is not None and self.progress.stage is Stage.UPLOADING and progress.phase in phases
+        phases = (TubePhase.CONFIRMED, *IN_UPLOAD)
+        return progress is not None and self.progress.stage is RecalibrationStage.UPLOADING and progress.phase in phases
 
     def due_requests(self, now: float) -> list[Request]:
         """What to send at ``now`` (s, own clock)."""
         p = self.progress
         requests = []
-        for tube in p.tubes.values() if p.stage in (*BEFORE_UPLOAD, Stage.UPLOADING) else ():
+        for tube in p.tubes.values() if p.stage in (*BEFORE_UPLOAD, RecalibrationStage.UPLOADING) else ():
             if now >= self._again.get(tube.tube, -math.inf) and (request := self._next_request(tube)) is not None:
                 seconds = request.arguments.get("seconds", 0.0)
                 self._again[tube.tube] = now + SILENT_AGAIN + float(seconds or 0.0)
@@ -241,8 +252,8 @@ class FieldProcedure:
         if tube is None or state.cycles > before:
             return
         self._again.pop(state.tube, None)
-        if tube.phase in IN_UPLOAD and self.progress.stage is Stage.UPLOADING:
-            tube.phase, tube.restarted = Phase.CONFIRMED, True
+        if tube.phase in IN_UPLOAD and self.progress.stage is RecalibrationStage.UPLOADING:
+            tube.phase, tube.restarted = TubePhase.CONFIRMED, True
             tube.hash_after_restart = self._whole_hash(tube, state.parameters_hash.hex())
 
     def on_block_status(self, status: BlockStatus, *, has_surveyed: bool = False) -> None:
@@ -250,15 +261,15 @@ class FieldProcedure:
         if status.phase is UploadPhase.APPLIED and has_surveyed and status.tube not in self.progress.mixed:
             self.progress.mixed.append(status.tube)
         tube = self.progress.tubes.get(status.tube)
-        if tube is None or tube.phase is not Phase.UPLOADING or (block := tube.block) is None:
+        if tube is None or tube.phase is not TubePhase.UPLOADING or (block := tube.block) is None:
             return
         if status.digest != block.sha256():
             return
         self._again.pop(status.tube, None)
         if status.phase is UploadPhase.APPLIED:
-            tube.phase = Phase.VERIFYING
+            tube.phase = TubePhase.VERIFYING
         else:
-            tube.phase, tube.detail = Phase.REFUSED, f"upload {status.phase.name.lower()}: {status.detail}"
+            tube.phase, tube.detail = TubePhase.REFUSED, f"upload {status.phase.name.lower()}: {status.detail}"
             self._end_if_all_ended()
 
     def count_records(self, tube: TubeProgress) -> int:
@@ -267,14 +278,14 @@ class FieldProcedure:
 
     def _next_request(self, tube: TubeProgress) -> Request | None:
         p = self.progress
-        if tube.version_before is None or tube.phase is Phase.VERIFYING:
+        if tube.version_before is None or tube.phase is TubePhase.VERIFYING:
             return Request(tube.tube, "parameters", {})
-        if p.stage is Stage.COLLECTING and p.attitudes and p.attitudes[-1].left is None:
+        if p.stage is RecalibrationStage.COLLECTING and p.attitudes and p.attitudes[-1].left is None:
             place = len(p.attitudes) - 1
             if place not in self._good(tube):
                 return Request(tube.tube, "static_record", {"seconds": p.attitudes[place].seconds})
-        if p.stage is Stage.UPLOADING and tube.phase is Phase.CONFIRMED:
-            tube.phase = Phase.UPLOADING
+        if p.stage is RecalibrationStage.UPLOADING and tube.phase is TubePhase.CONFIRMED:
+            tube.phase = TubePhase.UPLOADING
             tube.uploads += 1
             return Request(tube.tube, "upload_parameters", {}, tube.block)
         return None
@@ -300,7 +311,7 @@ class FieldProcedure:
             )
         found = made(tube, before)
         tube.proposed, tube.found, tube.calibration = found.block.canonical().hex(), found.found, found.calibration
-        tube.phase, tube.detail = Phase.PROPOSED, ""
+        tube.phase, tube.detail = TubePhase.PROPOSED, ""
 
     def block_before(self, tube: TubeProgress) -> ParameterBlock | None:
         """Block that the tube used at the beginning, if it is known here."""
@@ -315,11 +326,11 @@ class FieldProcedure:
         self._again.pop(tube.tube, None)
         if tube.version_before is None:
             tube.version_before, tube.hash_before = version, digest
-        elif tube.phase is Phase.VERIFYING and (block := tube.block) is not None:
+        elif tube.phase is TubePhase.VERIFYING and (block := tube.block) is not None:
             tube.hash = digest
             same = digest == block.sha256().hex()
             tube.phase, tube.detail = (
-                (Phase.DONE, "") if same else (Phase.REFUSED, f"it uses version {version} {digest}")
+                (TubePhase.DONE, "") if same else (TubePhase.REFUSED, f"it uses version {version} {digest}")
             )
             self._end_if_all_ended()
 
@@ -332,10 +343,10 @@ class FieldProcedure:
             self.progress.attitudes[-1].left = rig_now
 
     def _end_if_all_ended(self) -> None:
-        if all(tube.phase in (Phase.DONE, Phase.REFUSED) for tube in self.progress.tubes.values()):
-            self.progress.stage = Stage.DONE
+        if all(tube.phase in (TubePhase.DONE, TubePhase.REFUSED) for tube in self.progress.tubes.values()):
+            self.progress.stage = RecalibrationStage.DONE
 
-    def _expect(self, *stages: Stage) -> None:
+    def _expect(self, *stages: RecalibrationStage) -> None:
         stage = self.progress.stage
         if stage not in stages:
             raise SelectorError(f"expected a calibration that is {' or '.join(stages)}, it is {stage}")
@@ -347,5 +358,5 @@ def _lies_in(record: StaticRecord, attitude: Attitude) -> bool:
     return attitude.at - CLOCK_TOLERANCE <= record.begun_at and record.ended_at <= left
 
 
-def _list(tubes: Iterable[int]) -> str:
+def _list_tubes(tubes: Iterable[int]) -> str:
     return ", ".join(str(tube) for tube in tubes)

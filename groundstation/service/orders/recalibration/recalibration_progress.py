@@ -10,7 +10,7 @@ from telemetry.messages import Vector3
 from telemetry.parameters import ParameterBlock, unpack_block
 
 
-class Stage(enum.StrEnum):
+class RecalibrationStage(enum.StrEnum):
     """Of the whole procedure."""
 
     IDLE = "idle"
@@ -20,7 +20,7 @@ class Stage(enum.StrEnum):
     DONE = "done"
 
 
-class Phase(enum.StrEnum):
+class TubePhase(enum.StrEnum):
     """Of one tube."""
 
     COLLECTING = "collecting"
@@ -60,7 +60,7 @@ class TubeProgress:
     """One tube's part."""
 
     tube: int
-    phase: Phase = Phase.COLLECTING
+    phase: TubePhase = TubePhase.COLLECTING
     detail: str = ""
     version_before: int | None = None  # None until the tube told what it uses
     hash_before: str = ""
@@ -80,10 +80,10 @@ class TubeProgress:
 
 
 @dataclass(slots=True)
-class Progress:
+class RecalibrationProgress:
     """The whole procedure."""
 
-    stage: Stage = Stage.IDLE
+    stage: RecalibrationStage = RecalibrationStage.IDLE
     attitudes: list[Attitude] = field(default_factory=list)
     tubes: dict[int, TubeProgress] = field(default_factory=dict)
     proposal: str = ""  # hash of all proposed blocks
@@ -94,7 +94,7 @@ class Progress:
         return IDLE_TEXT if self == IDLE else json.dumps(asdict(self), sort_keys=True)
 
     @classmethod
-    def from_json(cls, text: str) -> Progress:
+    def from_json(cls, text: str) -> RecalibrationProgress:
         """Progress of a text that ``to_json`` made."""
         whole = json.loads(text)
         tubes = {}
@@ -104,10 +104,12 @@ class Progress:
                 x, y, z = found["bias_std"]
                 found = Found(**found | {"bias_std": (x, y, z)})
             orders = {int(sequence): place for sequence, place in row["orders"].items()}
-            tubes[int(name)] = TubeProgress(**row | {"phase": Phase(row["phase"]), "orders": orders, "found": found})
+            tubes[int(name)] = TubeProgress(
+                **row | {"phase": TubePhase(row["phase"]), "orders": orders, "found": found}
+            )
         attitudes = [Attitude(**row) for row in whole["attitudes"]]
-        return cls(Stage(whole["stage"]), attitudes, tubes, whole["proposal"], whole.get("mixed", []))
+        return cls(RecalibrationStage(whole["stage"]), attitudes, tubes, whole["proposal"], whole.get("mixed", []))
 
 
-IDLE = Progress()
+IDLE = RecalibrationProgress()
 IDLE_TEXT = json.dumps(asdict(IDLE), sort_keys=True)  # asked for at every timer of a rig that calibrates nothing

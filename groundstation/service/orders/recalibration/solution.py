@@ -25,7 +25,7 @@ class Proposal:
     calibration: str
 
 
-def propose(rests: Sequence[Rest], before: ParameterBlock, gravity: float, day: str) -> Proposal:
+def propose_block(rests: Sequence[Rest], before: ParameterBlock, gravity: float, day: str) -> Proposal:
     """Block after ``before``: a new accelerometer, the gyroscope as it was. ``gravity`` in m/s^2.
 
     Raises

@@ -1,0 +1,1 @@
+"""A rig that is drilled: in real processes, or with objects in this one."""

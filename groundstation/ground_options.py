@@ -1,0 +1,156 @@
+"""Options of the ground station's command as what its operator knows of the rig and the hole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from groundstation.page_options import PageRequest, page_options
+from telemetry.runtime.process_options import PlaceRequest, clock_option, key_option, keys_option, place_options
+from telemetry.runtime.typed_options import gather_options
+
+TOLERANCES = ("en-12716", "5-cm", "0.27-deg")
+POSITIVE = click.FloatRange(0.0, min_open=True)
+WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
+
+
+@dataclass(frozen=True, slots=True)
+class GroundRequest:
+    """Rig, design and hole as the options say."""
+
+    tube_length_m: float
+    target_m: float
+    design_inclination_deg: float
+    design_azimuth_deg: float
+    column_radius_m: float
+    tolerance: str
+    steering_deg_per_m: float
+    string_transport: str
+    collar_inclination_deg: float
+    collar_azimuth_deg: float
+    collar_std_deg: float
+    weighting: str
+    accelerometer_bias_std_deg: float
+    mount_std_deg: float
+    wall: Path | None
+    hole: str
+    database: str | None
+
+    def to_settings(self) -> dict[str, Any]:
+        """Settings by the keys of ``GroundConfig``, which looks at their ranges."""
+        return {
+            "tube_length": self.tube_length_m,
+            "target": self.target_m,
+            "design_inclination_deg": self.design_inclination_deg,
+            "design_azimuth_deg": self.design_azimuth_deg,
+            "column_radius": self.column_radius_m,
+            "tolerance": self.tolerance,
+            "steering_deg_per_m": self.steering_deg_per_m,
+            "string_transport": self.string_transport,
+            "collar_inclination_deg": self.collar_inclination_deg,
+            "collar_azimuth_deg": self.collar_azimuth_deg,
+            "collar_std_deg": self.collar_std_deg,
+            "weighting": self.weighting,
+            "accelerometer_bias_std_deg": self.accelerometer_bias_std_deg,
+            "mount_std_deg": self.mount_std_deg,
+            "wall": self.wall,
+            "hole": self.hole,
+            "database_url": self.database,
+        }
+
+
+ground_options = gather_options(
+    click.option("--tube-length-m", type=POSITIVE, default=2.0, show_default=True, help="Length of every tube."),
+    click.option("--target-m", type=POSITIVE, default=30.0, show_default=True, help="Length of the design axis."),
+    click.option(
+        "--design-inclination-deg",
+        type=click.FloatRange(0.0, 180.0),
+        default=0.0,
+        show_default=True,
+        help="Of the design axis; 0 is vertical.",
+    ),
+    click.option("--design-azimuth-deg", type=float, default=0.0, show_default=True, help="Of the design axis."),
+    click.option(
+        "--column-radius-m", type=POSITIVE, default=0.6, show_default=True, help="Radius of the finished column."
+    ),
+    click.option(
+        "--tolerance",
+        type=click.Choice(TOLERANCES),
+        default=TOLERANCES[0],
+        show_default=True,
+        help="Limit of the deviation from the design axis.",
+    ),
+    click.option(
+        "--steering-deg-per-m",
+        type=POSITIVE,
+        default=0.5,
+        show_default=True,
+        help="The most by which this rig bends a hole back; until where a correction still helps follows from it.",
+    ),
+    click.option(
+        "--string-transport",
+        type=click.Choice(("shortest", "parallel")),
+        default="shortest",
+        show_default=True,
+        help="Yaw of a tube in a bent hole: that of the head, or as a shaft without twist carries it along.",
+    ),
+    click.option(
+        "--collar-inclination-deg",
+        type=click.FloatRange(0.0, 180.0, max_open=True),
+        default=0.0,
+        show_default=True,
+        help="Of the hole at the collar, where the head holds the string.",
+    ),
+    click.option("--collar-azimuth-deg", type=float, default=0.0, show_default=True, help="Of the hole at the collar."),
+    click.option(
+        "--collar-std-deg",
+        type=click.FloatRange(0.0),
+        default=0.0,
+        show_default=True,
+        help="Standard error of the direction at the collar, each way.",
+    ),
+    click.option(
+        "--weighting",
+        type=click.Choice(WEIGHTINGS),
+        default=WEIGHTINGS[0],
+        show_default=True,
+        help="How the measurements of one station are weighted.",
+    ),
+    click.option(
+        "--accelerometer-bias-std-deg",
+        type=click.FloatRange(0.0),
+        default=0.06,
+        show_default=True,
+        help="Accelerometer bias as a tilt, standard deviation: 1 mg of the bare sensor, 0.002 of calibrated ones.",
+    ),
+    click.option(
+        "--mount-std-deg",
+        type=click.FloatRange(0.0),
+        default=0.05,
+        show_default=True,
+        help="Standard error of an IMU's mounting about its tube's axis.",
+    ),
+    click.option(
+        "--wall",
+        type=click.Path(path_type=Path, dir_okay=False),
+        help="Wall file of which this hole is a column: its joints are judged while it is drilled.",
+    ),
+    click.option("--hole", default="", help="Name of this hole in the wall file."),
+    click.option(
+        "--database",
+        metavar="URL",
+        help="Where surveys and alarms are kept, such as postgresql://USER@HOST/NAME; the password from PGPASSWORD or "
+        "~/.pgpass  [default: SQLite in the folder]",
+    ),
+    page_options,
+    clock_option,
+    key_option,
+    keys_option,
+    place_options,
+    request=GroundRequest,
+    place=PlaceRequest,
+    served=PageRequest,
+)

@@ -1,0 +1,116 @@
+"""From the measurements of tubes to the stations of the hole, also of those that wait for a depth. No I/O."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from groundstation.config import GroundConfig
+from groundstation.service.hole.resolving import Found, Resolver
+from groundstation.service.hole.surveyed_hole import SurveyedHole
+from groundstation.service.string.known_string import KnownString
+from groundstation.service.string.stored import Stored
+from groundstation.survey.fusion.shared import SharedErrors
+from groundstation.survey.fusion.survey_trust import Trust, trust_of
+from telemetry.messages import SurveyMeasurement
+
+UNTRUSTED = "survey_untrusted"  # alarm: a measurement is fused with an unknown yaw
+NEVER_FUSED = (Trust.UNDATED, Trust.SET_ASIDE)
+Waiting = Stored[SurveyMeasurement]
+
+
+class Placement:
+    """Measurements on their way into a hole.
+
+    Parameters
+    ----------
+    config : of the ground station
+    string : that was surveyed
+    hole : that they belong to
+    shared : the errors that they share
+
+    Attributes
+    ----------
+    waiting : measurements whose depth is not known yet; what the store has of it may yet be another
+    set_aside : measurements of a faulty sensor, never fused
+    refused : measurements with invalid numbers
+    """
+
+    def __init__(self, config: GroundConfig, string: KnownString, hole: SurveyedHole, shared: SharedErrors) -> None:
+        mount_var = math.radians(config.mount_std_deg) ** 2
+        bias_std = math.radians(config.accelerometer_bias_std_deg) * config.gravity
+        self._string, self._hole = string, hole
+        self._resolver = Resolver(config.gravity, shared, mount_var, bias_std)
+        self.waiting: list[Waiting] = []
+        self.set_aside: list[SurveyMeasurement] = []
+        self.refused = 0
+        self._undated = 0  # measurements without rig time, which never have a depth
+
+    @property
+    def unplaced(self) -> int:
+        """Measurements without a known depth."""
+        return len(self.waiting) + self._undated
+
+    def wait_for_depth(self, one: Waiting) -> str:
+        """Have a stored measurement wait for a reading; returns the kind of alarm where it never is used, or ''."""
+        if unused := self._unused(one.message):
+            return unused
+        self.waiting.append(one)
+        return ""  # most wait for a moment; the watch tells of those that wait longer
+
+    def take_placeable(self) -> list[tuple[Waiting, float]]:
+        """Measurements that waited for their depth and have it now; they wait no more."""
+        if not self.waiting:
+            return []  # the usual case: called at every reading
+        waiting, self.waiting, placeable = self.waiting, [], []
+        for one in waiting:
+            md = self._string.depth_of(one.message, one.below)
+            if md is None:
+                self.waiting.append(one)
+            else:
+                placeable.append((one, md))
+        return placeable
+
+    def resolve_measurements(
+        self, measurements: Sequence[SurveyMeasurement], mds: Sequence[float]
+    ) -> list[Found | None]:
+        """What measurements with their depths (m) come to, worked out together; they are to be placed in this order.
+
+        None for each that is not fused.
+        """
+        fused, above, places = [], [], []
+        for place, m in enumerate(measurements):
+            if trust_of(m.flags) not in NEVER_FUSED:
+                fused.append(m)
+                above.append(self._string.tally.above(m.tube, m.hops))
+                places.append(place)
+        found: list[Found | None] = [None] * len(measurements)
+        if fused:
+            resolved = self._resolver.resolve_measurements(fused, [mds[place] for place in places], above)
+            for place, one in zip(places, resolved, strict=True):
+                found[place] = one
+        return found
+
+    def place(self, measurement: SurveyMeasurement, found: Found | None) -> str:
+        """Give the hole what a measurement came to; returns the kind of alarm where it is not used as it is, or ''."""
+        if unused := self._unused(measurement):
+            return unused
+        if found is None:
+            self.refused += 1
+            return "survey_refused"
+        self._hole.add_stop(*found, self._string.epoch_of(measurement))
+        return "" if trust_of(measurement.flags) is Trust.FULL else UNTRUSTED
+
+    def place_one(self, measurement: SurveyMeasurement, md: float) -> str:
+        """Resolve and place a measurement with its depth (m), see ``place``."""
+        return self.place(measurement, self.resolve_measurements([measurement], [md])[0])
+
+    def _unused(self, measurement: SurveyMeasurement) -> str:
+        trust = trust_of(measurement.flags)
+        if trust is Trust.UNDATED:
+            self._undated += 1
+            return "survey_unplaced"
+        if trust is Trust.SET_ASIDE:
+            self.set_aside.append(measurement)
+            return "survey_set_aside"
+        return ""

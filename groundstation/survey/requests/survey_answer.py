@@ -1,0 +1,133 @@
+"""A survey as it was asked for: the record read, its trajectory and region of uncertainty, the object for JSON."""
+
+from __future__ import annotations
+
+import datetime
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+from groundstation.errors import SurveyError
+from groundstation.survey.files.field_files import Understood, read_any
+from groundstation.survey.files.programme import read_programme, read_tie_on
+from groundstation.survey.files.survey_records import DisplacementRule, with_collar
+from groundstation.survey.requests.survey_request import PROGRAMME_ALONE, FrameRequest, SurveyRequest
+from groundstation.survey.requests.survey_rows import source_rows, station_at_depth, station_rows
+from groundstation.survey.tools.instruments import SurveyTool, load_tool
+from groundstation.survey.tools.iscwsa_json import to_json
+from groundstation.survey.well.analysis import Analysis, Stretch, analyse_survey, with_azimuth_error
+from groundstation.survey.well.depth_reference import DepthReference, depth_reference
+from groundstation.survey.well.gyro_export import as_gyro, needs_record
+from groundstation.survey.well.methods import Method
+from groundstation.survey.well.reference_frames import Norths, ReferenceFrame
+from groundstation.survey.well.well_record import SurveyRecord
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyAnswer:
+    """A survey: ``result`` is the object that ``borechain survey --json`` prints."""
+
+    request: SurveyRequest
+    record: SurveyRecord
+    tool: SurveyTool
+    instrument: str  # in words
+    found: Analysis
+    result: dict[str, Any]
+
+    def tool_text(self) -> str:
+        """Instrument as ISCWSA JSON; one that asks for columns of a record, as a gyro with those of this one."""
+        written = as_gyro(self.tool, self.record) if needs_record(self.tool) else self.tool
+        return to_json(written, datetime.datetime.now(datetime.UTC).date())
+
+
+def answer_survey(request: SurveyRequest) -> SurveyAnswer:
+    """Read, survey and answer.
+
+    Raises
+    ------
+    SurveyError, ToolError
+        When the record, the instrument or a file cannot be used, or what is asked contradicts itself.
+    """
+    check_request(request)
+    understood = read_any(request.file, DisplacementRule(request.displacement_rule), request.md_unit)
+    record = with_collar(understood.record) if request.from_collar else understood.record
+    tool = load_tool(request.instrument, request.parameter)
+    if request.azimuth_error_deg is not None:
+        tool = with_azimuth_error(tool, math.radians(request.azimuth_error_deg))
+    legs = [] if request.programme is None else read_programme(request.programme)
+    found = analyse_record(record, legs or tool, request)
+    instrument = ", ".join(f"{leg.tool.name} from {leg.top:g} m" for leg in legs) or tool.name
+    return SurveyAnswer(request, record, tool, instrument, found, survey_result(request, understood, instrument, found))
+
+
+def check_request(request: SurveyRequest) -> None:
+    """Refuse what contradicts itself.
+
+    Raises
+    ------
+    SurveyError
+        Naming the options of the command.
+    """
+    if request.from_collar and request.tie_on is not None:
+        raise SurveyError("expected --from-collar or --tie-on, got both")
+    if request.programme is not None and request.azimuth_error_deg is not None:
+        raise SurveyError(PROGRAMME_ALONE)
+
+
+def analyse_record(record: SurveyRecord, tool: SurveyTool | list[Stretch], request: SurveyRequest) -> Analysis:
+    """Trajectory and region of uncertainty in the frame that is asked for; errors as ``answer_survey``."""
+    frame = reference_frame(request.frame)
+    tied = None if request.tie_on is None else read_tie_on(request.tie_on)
+    section = math.radians(request.section_azimuth_deg)
+    found = analyse_survey(record, Method(request.method), tool, request.site.to_site(), section, frame, tied)
+    first, last = found.md[0], found.md[-1]
+    for depth in request.md:
+        if not first <= depth <= last:
+            raise SurveyError(f"--md {depth:g}: expected a depth of {first:g}..{last:g} m")
+    return found
+
+
+def reference_frame(asked: FrameRequest) -> ReferenceFrame:
+    """Norths and depth references of the record and of the answer."""
+    angles = (asked.north_of_site_deg or 0.0, asked.convergence_deg, asked.declination_deg)
+    answer = asked.answer_north
+    if answer is None:
+        answer = asked.north if asked.north_of_site_deg is None else "true"
+    frame = ReferenceFrame(asked.north, answer, Norths(*map(math.radians, angles)))
+    return replace(frame, depths=depth_references(asked), height_datum=asked.height_datum or "")
+
+
+def depth_references(asked: FrameRequest) -> DepthReference:
+    """Depth references of the record and of the answer, which fit the datum of heights and the origin."""
+    found = depth_reference(asked.depth_reference, asked.answer_depth_reference, asked.depth_reference_height_m)
+    from_datum = "height-datum" in (found.record, found.answer)
+    datum, origin = asked.height_datum, asked.origin
+    if from_datum and datum is None:
+        raise SurveyError("--depth-reference height-datum: expected --height-datum NAME beside it")
+    if datum is not None and origin is None and not from_datum:
+        raise SurveyError("--height-datum: expected --origin beside it")
+    if found.answer == "height-datum" and origin is not None and origin[2] != 0.0:
+        raise SurveyError(f"--origin: depths count from {datum}, so its height is 0; got {origin[2]:g} m")
+    return found
+
+
+def survey_result(request: SurveyRequest, understood: Understood, instrument: str, found: Analysis) -> dict[str, Any]:
+    """The object for JSON."""
+    frame, origin, sigma = found.frame, request.frame.origin, request.sigma
+    return {
+        "file": str(request.file),
+        "read_as": understood.line,
+        "method": request.method,
+        "instrument": instrument,
+        "north": frame.answer,
+        "depth_reference": frame.depths.answer,
+        "read_from": {"depth_reference": frame.depths.record, "height_m": frame.depths.height},
+        "height_datum": frame.height_datum or None,
+        "origin_m": None if origin is None else list(origin),
+        "sigma": sigma,
+        "stations": station_rows(found, sigma, origin),
+        "at": [station_at_depth(found, depth, sigma) for depth in request.md],
+        "closure_m": float(found.closure_distance[-1]),
+        "closure_azimuth_deg": math.degrees(found.closure_azimuth[-1]),
+        "sources": source_rows(found, sigma),
+    }

@@ -1,0 +1,69 @@
+"""What is asked of a survey: the record and how it is read, its frame, the place and the instrument."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from groundstation.survey.well.error_sources import Site
+
+PROGRAMME_ALONE = "--programme: expected neither --azimuth-error-deg nor --export-tool beside it"
+
+
+@dataclass(frozen=True, slots=True)
+class SiteFigures:
+    """The place as a user states it."""
+
+    gravity: float = 9.81  # m/s^2
+    field_nt: float = 50_000.0
+    dip_deg: float = 70.0
+    declination_deg: float = 0.0  # of magnetic from true north
+    latitude_deg: float = 52.0
+
+    def to_site(self) -> Site:
+        """The place in SI and rad."""
+        from groundstation.survey.well.error_sources import Site
+
+        dip, declination, latitude = map(math.radians, (self.dip_deg, self.declination_deg, self.latitude_deg))
+        return Site(self.gravity, self.field_nt, dip, declination, latitude)
+
+
+@dataclass(frozen=True, slots=True)
+class FrameRequest:
+    """Norths, depth references and origin of a record and of its answer; an answer's that is None follows."""
+
+    north: str = "site"
+    answer_north: str | None = None
+    north_of_site_deg: float | None = None
+    convergence_deg: float = 0.0
+    declination_deg: float = 0.0
+    origin: tuple[float, float, float] | None = None  # m, northing, easting, height of the point of zero
+    depth_reference: str = "collar"
+    answer_depth_reference: str | None = None
+    depth_reference_height_m: float | None = None  # of the former above the latter
+    height_datum: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyRequest:
+    """A record, the method and the instrument, and what is to be answered, as ``borechain survey`` takes them."""
+
+    file: Path
+    method: str = "balanced-tangential"
+    instrument: str = "relay"  # a name, or a file
+    parameter: Mapping[str, float] = field(default_factory=dict)  # constants of the error model by their names
+    sigma: float = 1.0  # standard deviations of the answer
+    azimuth_error_deg: float | None = None
+    displacement_rule: str = "exact"
+    from_collar: bool = False
+    md_unit: str | None = None
+    md: tuple[float, ...] = ()  # m, depths at which the position is asked too
+    tie_on: Path | None = None
+    programme: Path | None = None
+    section_azimuth_deg: float = 0.0
+    frame: FrameRequest = field(default_factory=FrameRequest)
+    site: SiteFigures = field(default_factory=SiteFigures)

@@ -1,0 +1,177 @@
+"""Options of the node's command as what the crew knows of its tube."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from node.process.cluster_options import ClusterRequest
+from telemetry.runtime.process_options import (
+    EndsRequest,
+    PlaceRequest,
+    above_option,
+    below_option,
+    clock_option,
+    key_option,
+    keys_option,
+    lower_option,
+    place_options,
+    upper_option,
+)
+from telemetry.runtime.typed_options import gather_options
+
+if TYPE_CHECKING:
+    from node.firmware.tube_settings import TubeSettings
+
+FILE = click.Path(path_type=Path, dir_okay=False)
+SCHEMES = ("forward", "estimate", "intersection")
+
+
+@dataclass(frozen=True, slots=True)
+class TubeRequest:
+    """A tube as its options say; ``imus`` are its IMUs."""
+
+    tube: int
+    drive_joint_deg: float
+    lower_joint_deg: float
+    joint_std_deg: float
+    mount_std_deg: float
+    kernel: Literal["float64", "fixed"]
+    scheme: str
+    stiffness_nm: float
+    torsion: Literal["gate", "variance"]
+    joints: Literal["marks", "solved", "both"]
+    imus: ClusterRequest
+
+    def to_settings(self) -> TubeSettings:
+        """Settings of the node in SI and rad.
+
+        Raises
+        ------
+        NodeConfigurationError, CalibrationError
+            When a setting is outside its range, or a file is not a calibration.
+        """
+        from node.firmware.tube_settings import MakeUpAngle, TubeSettings
+        from node.kernels.record.filter_record import Scheme
+
+        joint_std = math.radians(self.joint_std_deg)
+        return TubeSettings(
+            tube=self.tube,
+            drive_joint=MakeUpAngle(math.radians(self.drive_joint_deg), joint_std),
+            lower_joint=MakeUpAngle(math.radians(self.lower_joint_deg), joint_std),
+            mount_std=math.radians(self.mount_std_deg),
+            scheme=Scheme[self.scheme.upper()],
+            kernel=self.kernel,
+            stiffness=self.stiffness_nm,
+            torsion=self.torsion,
+            joints=self.joints,
+            imus=self.imus.to_settings(),
+        )
+
+
+tube_options = gather_options(
+    click.option("--tube", type=int, required=True, help="Number of the tube, 1 is the lowest."),
+    click.option(
+        "--drive-joint-deg", type=float, default=0.0, help="Angle read from the scribe marks, drive head to this tube."
+    ),
+    click.option(
+        "--lower-joint-deg",
+        type=float,
+        default=0.0,
+        help="Angle read from the scribe marks, this tube to the one below.",
+    ),
+    click.option(
+        "--joint-std-deg", type=float, default=0.05, show_default=True, help="Standard error of such a reading."
+    ),
+    click.option(
+        "--mount-std-deg",
+        type=float,
+        default=0.05,
+        show_default=True,
+        help="Standard error of the IMU's mounting about the tube's axis.",
+    ),
+    click.option(
+        "--kernel",
+        type=click.Choice(["float64", "fixed"]),
+        default="float64",
+        show_default=True,
+        help="Filter in floating point or in integers.",
+    ),
+    click.option(
+        "--scheme",
+        type=click.Choice(SCHEMES),
+        default="forward",
+        show_default=True,
+        help="What is relayed down the string: the encoder's measurement, or (for comparison) the node's own estimate.",
+    ),
+    click.option(
+        "--stiffness-nm",
+        type=float,
+        default=math.inf,
+        help="Torsional stiffness of the tube, N m per rad; rigid if absent.",
+    ),
+    click.option(
+        "--torsion",
+        type=click.Choice(["gate", "variance"]),
+        default="gate",
+        show_default=True,
+        help="Yaw from above while the string is under torque: ignored, or used with the variance of the twist.",
+    ),
+    click.option(
+        "--joints",
+        type=click.Choice(["marks", "solved", "both"]),
+        default="marks",
+        show_default=True,
+        help="Source of the angle of a joint made up above: scribe marks, the node's saved yaw, or both.",
+    ),
+    click.option(
+        "--imu",
+        "sources",
+        multiple=True,
+        help="The node's own IMU: replay:FILE, timed:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS. Repeat for several.",
+    ),
+    click.option(
+        "--imu-noise",
+        "noises",
+        type=float,
+        multiple=True,
+        help="Noise of an IMU as a multiple of the default. Once for each IMU.",
+    ),
+    click.option(
+        "--imu-offset-mm",
+        "offsets",
+        type=(float, float),
+        multiple=True,
+        help="Position of an IMU off the tube's axis, X Y. Once for each IMU.",
+    ),
+    click.option(
+        "--imu-gyroscope",
+        "gyroscopes",
+        type=FILE,
+        multiple=True,
+        help="Calibration file of an IMU's gyroscope. Once for each IMU.",
+    ),
+    click.option(
+        "--imu-accelerometer",
+        "accelerometers",
+        type=FILE,
+        multiple=True,
+        help="Calibration file of an IMU's accelerometer. Once for each IMU.",
+    ),
+    clock_option,
+    above_option,
+    below_option,
+    upper_option,
+    lower_option,
+    key_option,
+    keys_option,
+    place_options,
+    imus=ClusterRequest,
+    request=TubeRequest,
+    ends=EndsRequest,
+    place=PlaceRequest,
+)
