@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from node_by_node import NodeByNode
 from string_of_one import Sample, Spoil, StringOfOne
 
 from node.firmware.sensor_limits import SensorLimits
@@ -79,10 +80,15 @@ class AverageGoesOn(StepInParts):
 
 
 def drilled(step: Step | None, spoil: Spoil) -> StringOfOne:
+    """A string of one tube: by its kernel, or by another step, which a kernel would not take."""
     string = StringOfOne(1, spoil, blocks=1)
-    if step is not None:
-        string.tube._loop = string.tube._loop._replace(step=step)
-    return string.run()
+    if step is None:
+        return string.run()
+    string.tube._loop = string.tube._loop._replace(step=step)
+    driver = NodeByNode(string.string, lambda tube, cycle: spoil(cycle, string.world.imu_sample(tube, cycle)))
+    for cycle in range(string.cycles):
+        driver.step(cycle)
+    return string
 
 
 def resting() -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,10 +40,11 @@ def drill_node_by_node(string: DirectString) -> StringRun:
 
 
 class NodeByNode:
-    """Steps the nodes of a string that has not been drilled."""
+    """Steps the nodes of a string that has not been drilled; ``sample_of`` a tube and a cycle is what its IMU reads."""
 
-    def __init__(self, string: DirectString) -> None:
+    def __init__(self, string: DirectString, sample_of: Callable[[int, int], Sequence[float]] | None = None) -> None:
         self._string, self._world = string, string.world
+        self._sample_of = sample_of or self._world.imu_sample
         self._file = self._world.scenario.file
         self._clocks, self._lost = record_hops(self._world)
         self._measured = measure_by_firmware(self._world)
@@ -71,7 +72,7 @@ class NodeByNode:
         joints, hops = self._file.clocks.joint_std_ms, top - tube + 1
         stated = joints if self._file.clocks.stated_std_ms is None else self._file.clocks.stated_std_ms
         around = RigContext(self._is_joined(tube, top, end), hops, end, (1e-3 * stated) ** 2 * hops, True)
-        reading = reading_of((begin, *self._world.imu_sample(tube, cycle)), end)
+        reading = reading_of((begin, *self._sample_of(tube, cycle)), end)
         return self._string.tubes[tube].on_cycle(reading, around)
 
     def _is_joined(self, tube: int, top: int, end: float) -> bool:

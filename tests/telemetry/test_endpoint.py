@@ -254,14 +254,14 @@ def test_a_relay_hands_on_the_very_bytes_that_came(monkeypatch: pytest.MonkeyPat
     chain = Chain([2, 1])
     chain.run(5.0)
     encoded: list[int] = []
-    plain = end_to_end.encode
+    plain = end_to_end.encode_message
 
     def counted(message: Message) -> bytes:
         encoded.extend([1] if isinstance(message, Event) else [])
         return plain(message)
 
     for room in (endpoint, end_to_end):
-        monkeypatch.setattr(room, "encode", counted)
+        monkeypatch.setattr(room, "encode_message", counted)
     event = Event(1, chain.stations[1].mail.series.take(), 100.0, Severity.INFO, "stopped")
     chain.stations[1].mail.submit(event, chain.local(1))
     chain.run(3.0)
