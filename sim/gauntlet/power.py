@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from sim.gauntlet.fault import EVERYBODY, TUBES, Draw, Faulty, Step, draw_interval, drawn_tube, own_stream
+from sim.gauntlet.fault import EVERYBODY, TUBES, Draw, Faulty, Step, draw_interval, own_stream
 from telemetry.messages import BASE, ENCODER
 
 Handle = Callable[[Faulty, int, np.random.Generator], None]
@@ -181,8 +181,3 @@ def ground_off_across_stop(random: np.random.Generator, begin: float, end: float
     del begin
     drawn = float(random.uniform(22.0, 34.0))
     return [Step(end - drawn, lambda rig: rig.cut(BASE)), Step(end, lambda rig: rig.start(BASE))]
-
-
-def drawn_process(random: np.random.Generator) -> int:
-    """Draw a tube or the ground station."""
-    return BASE if random.random() < 0.3 else drawn_tube(random)
