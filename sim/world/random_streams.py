@@ -45,6 +45,7 @@ class RandomStream(IntEnum):
     ROUGH_STOP_ANGLES = 47  # where a driller stops
     INCREMENTS = 48  # noise of the eighths of a cycle about their mean
     WELLS = 2000  # a string in one of many wells, for the coverage of ellipses
+    PATHS = 2001  # a hole of a kind, for the projection
     TURN_TABLE = 3001  # a gyroscope and its table
     ROBOT_ARM = 3002  # an accelerometer and its arm
     LINK = 0xA1  # fate and delays of the frames of one port

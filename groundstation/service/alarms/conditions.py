@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from groundstation.service.alarms.crew_alarms import Condition
 from groundstation.service.alarms.rig_alarms import Level, RigAlarms
-from groundstation.service.alarms.verdict import FINEST_CM
+from groundstation.service.alarms.spread_text import spread_text
 from groundstation.service.hole.deviation_alarms import DeviationAlarm
 from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.service.string.known_string import KnownString
@@ -34,7 +34,7 @@ def _of_the_column(hole: SurveyedHole) -> Iterator[Condition]:
         if alarm.kind not in highest or alarm.level > highest[alarm.kind].level:
             highest[alarm.kind] = alarm
     for kind, alarm in highest.items():
-        detail = f"{100.0 * alarm.size:.1f} ± {max(100.0 * alarm.std, FINEST_CM):.1f} cm"
+        detail = f"{spread_text(alarm.size, alarm.half_width)} (95 %)"
         threshold = f"{100.0 * alarm.level:.0f} % of {100.0 * alarm.limit:.0f} cm"
         yield Condition(kind, "column", LEVEL_OF[alarm.level], detail, alarm.md, alarm.direction, threshold)
 

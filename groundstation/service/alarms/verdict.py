@@ -1,8 +1,17 @@
 """Is the hole on its way, and if not: how far off, in which direction, and until where can it be corrected? No I/O.
 
-One of five words, a function of what is known and of nothing else. ``DON'T KNOW`` comes before all others wherever one
-of the things that the answer counts on is missing, so that old data never look good; what the surveys alone would
-say is told beside it.
+One of five words, a function of what is known and of nothing else. The four that are about the hole are chances:
+
+ON TARGET   it ends within its limit with 95 % or more
+WATCH       with less, but the depth by which a correction must begin lies behind the next survey
+STEER       with less than 50 % and steering helps, or that depth comes before the next survey, or has been passed
+OUT         a station is beyond its limit, or even with a correction from now on it ends within with less than 50 %
+
+``DON'T KNOW`` comes before all others wherever one of the things that the answer counts on is missing, so that old data
+never look good; what the surveys alone would say is told beside it.
+
+A correction is taken to bend the hole towards its axis by the rig's stated curvature k, beside what the hole does by
+itself, from a length z on: so it moves the end by up to k (L - z)^2 / 2 at the target L, and holds what it has reached.
 """
 
 from __future__ import annotations
@@ -11,12 +20,15 @@ import enum
 import math
 from dataclasses import dataclass, replace
 
+from groundstation.service.alarms.spread_text import spread_text
 from groundstation.survey.wall.column_deviation import LEVELS, Deviation
+from groundstation.survey.wall.projected_end import ProjectedEnd
 
-LOWEST, STEER_AT, LIMIT = LEVELS  # of the tolerance
+LOWEST, _, LIMIT = LEVELS  # of the tolerance, of what was drilled
+SURE = 0.95  # chance of ending within, from which on it is on target; a correction is to bring it there
+EVEN = 0.5  # chance below which it is more likely out than in
 WINDS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
 SURELY = 2.0  # standard deviations
-FINEST_CM = 0.1  # cm, of a line for a screen
 
 
 class Word(enum.StrEnum):
@@ -44,23 +56,42 @@ class VerdictDoubt(enum.StrEnum):
 class Known:
     """What a verdict is made of; m and rad.
 
-    ``curvature`` (rad/m) is the most by which the rig can bend the hole back.
+    ``curvature`` (rad/m) is the most by which the rig can bend the hole back, ``stop`` the way to the next survey.
     """
 
     target: float  # length of the design axis
     curvature: float
+    stop: float
     bit: float | None = None
     worst: Deviation | None = None  # of the stations surveyed, the one that uses most of its tolerance
-    projection: Deviation | None = None  # at the target, if the hole goes on straight
+    projection: ProjectedEnd | None = None  # at the target, if the hole goes on as it tends to
     doubts: tuple[tuple[VerdictDoubt, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Deadline:
+    """The last depth from which a correction still makes it `SURE` that the hole ends within, and what if it is late.
+
+    It stays what it is when it has been passed: ``left`` is negative then, and ``best`` the chance that a correction
+    from now on still gives.
+    """
+
+    before: float  # m along the axis
+    left: float | None  # m of drilling until then; None where the depth of the bit is not known
+    best: float
+
+    @property
+    def is_missed(self) -> bool:
+        """Whether the bit is beyond it."""
+        return self.left is not None and self.left < 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class HoleVerdict:
     """The answer, and what it rests on.
 
-    ``by_surveys`` is what the surveys say, whatever is doubtful now. ``about`` is the deviation that decided, and
-    ``act_before`` (m along the axis) the last depth from which a correction still helps; both may be absent.
+    ``by_surveys`` is what the surveys say, whatever is doubtful now. ``about`` is the deviation that decided and
+    ``end`` the projection, where it is about that; ``deadline`` is absent where nothing is to be steered.
     """
 
     word: Word
@@ -69,8 +100,8 @@ class HoleVerdict:
     doubts: tuple[VerdictDoubt, ...] = ()
     what: str = ""  # deviation or projection
     about: Deviation | None = None
-    act_before: float | None = None
-    left: float | None = None  # m of drilling until then
+    end: ProjectedEnd | None = None
+    deadline: Deadline | None = None
 
 
 def judge_hole(known: Known) -> HoleVerdict:
@@ -79,9 +110,10 @@ def judge_hole(known: Known) -> HoleVerdict:
     doubts = list(known.doubts)
     if known.projection is None:
         doubts.insert(0, (VerdictDoubt.NO_SURVEY, "no station has been surveyed yet"))
-    elif verdict.word is not Word.OUT and (spread := SURELY * known.projection.std) >= known.projection.limit:
+    elif verdict.word is not Word.OUT and (spread := SURELY * known.projection.surveyed_std) >= known.projection.limit:
         limit = f"{100.0 * known.projection.limit:.0f} cm"
-        doubts.append((VerdictDoubt.UNCERTAIN, f"the end is known to ±{100.0 * spread:.0f} cm, the limit is {limit}"))
+        why = f"the surveys leave the end open by ±{100.0 * spread:.0f} cm, the limit is {limit}"
+        doubts.append((VerdictDoubt.UNCERTAIN, why))
     if not doubts:
         return verdict
     return replace(
@@ -99,40 +131,53 @@ def judge_surveys(known: Known) -> HoleVerdict:
             f"the hole is {_size_text(worst)} off at {worst.md:.1f} m, the limit there is {100.0 * worst.limit:.0f} cm"
         )
         return HoleVerdict(Word.OUT, Word.OUT, (why,), (), "deviation", worst)
-    before = act_before(end, known)
-    left = None if known.bit is None else before - known.bit
-    word, why = _word_of(worst, end, left)
-    if word is Word.ON_TARGET or (word is Word.WATCH and end.ratio < LOWEST and worst.ratio >= LOWEST):
-        what, about = ("deviation", worst) if word is Word.WATCH else ("projection", end)
-        return HoleVerdict(word, word, (why,), (), what, about)
-    return HoleVerdict(word, word, (why,), (), "projection", end, before, left)
-
-
-def _word_of(worst: Deviation, end: Deviation, left: float | None) -> tuple[Word, str]:
-    ends = f"ends {_size_text(end)} off, the limit is {100.0 * end.limit:.0f} cm ({100.0 * end.ratio:.0f} %)"
-    if end.ratio >= LIMIT and left is not None and left <= 0.0:
-        return Word.OUT, f"{ends}, and no correction can bring it back any more"
-    if end.ratio >= STEER_AT:
-        return Word.STEER, ends
-    if end.ratio >= LOWEST:
-        return Word.WATCH, ends
-    if worst.ratio >= LOWEST:
+    if end.within >= SURE and worst.ratio >= LOWEST:
         used = f"{100.0 * worst.ratio:.0f} % of the tolerance"
-        return Word.WATCH, f"{_size_text(worst)} off at {worst.md:.1f} m, {used}; it ends within"
-    if end.size + SURELY * end.std >= end.limit:
-        return Word.WATCH, f"{ends}, and may be beyond it"
-    return Word.ON_TARGET, ends
+        why = f"{_size_text(worst)} off at {worst.md:.1f} m, {used}; {_within_text(end)}"
+        return HoleVerdict(Word.WATCH, Word.WATCH, (why,), (), "deviation", worst)
+    needs_none = end.is_reached or end.within >= SURE
+    deadline = None if needs_none else correction_deadline(end, known)
+    word, why = _word_of(end, deadline, known.stop)
+    return HoleVerdict(word, word, (why,), (), "projection", end.ends, end, deadline)
 
 
-def act_before(end: Deviation, known: Known) -> float:
-    """Length along the axis (m) at which a correction must have begun.
+def _word_of(end: ProjectedEnd, deadline: Deadline | None, stop: float) -> tuple[Word, str]:
+    """Word about the end, and why."""
+    within = _within_text(end)
+    if end.within >= SURE:
+        return Word.ON_TARGET, within
+    if deadline is None:
+        return Word.WATCH if end.within >= EVEN else Word.OUT, f"it is at its depth; {within}"
+    if deadline.is_missed:
+        missed = f"{100.0 * SURE:.0f} % was to be had until {deadline.before:.1f} m"
+        word = Word.STEER if deadline.best >= EVEN else Word.OUT
+        return word, f"{within}; {missed}, now {chance_text(deadline.best)} at best"
+    if end.within < EVEN <= end.centred:
+        return Word.STEER, f"{within}, more likely out than in"
+    if deadline.left is not None and deadline.left < stop:
+        return Word.STEER, f"{within}, and the next survey comes too late for a correction"
+    return Word.WATCH, within if end.centred >= EVEN else f"{within}, too early to say where it ends"
 
-    A hole that is bent by ``k`` rad/m from a length z on is moved by k (L - z)^2 / 2 at the target L. The correction is
-    to bring the end below the lowest level; where it is too late for that, at least within the limit.
+
+def correction_deadline(end: ProjectedEnd, known: Known) -> Deadline:
+    """Where a correction must begin, that the hole ends within its limit by the chance `SURE`.
+
+    Bent by ``k`` rad/m from a length z on, its end moves by k (L - z)^2 / 2 at the target L. So it is in time where
+    that and the limit together hold the end that is foreseen without it.
     """
-    wanted = [end.size - level * end.limit for level in (LOWEST, LIMIT)]
-    lengths = [known.target - math.sqrt(2.0 * max(excess, 0.0) / known.curvature) for excess in wanted]
-    return lengths[0] if known.bit is None or lengths[0] > known.bit else lengths[1]
+    excess = max(end.distance_of(SURE) - end.limit, 0.0)
+    before = known.target - math.sqrt(2.0 * excess / known.curvature)
+    if known.bit is None:
+        return Deadline(before, None, end.chance_within(end.limit))
+    moved = 0.5 * known.curvature * max(known.target - known.bit, 0.0) ** 2
+    return Deadline(before, before - known.bit, end.chance_within(end.limit + moved))
+
+
+def chance_text(chance: float) -> str:
+    """A chance in per cent, for people: never 0 or 100 where it is neither."""
+    if 0.0 < chance < 0.01:
+        return "< 1 %"
+    return "> 99 %" if 0.99 < chance < 1.0 else f"{100.0 * chance:.0f} %"
 
 
 def compass_point(azimuth: float) -> str:
@@ -145,5 +190,9 @@ def deviation_azimuth(deviation: Deviation) -> float:
     return math.atan2(deviation.offset[1], deviation.offset[0]) % math.tau
 
 
+def _within_text(end: ProjectedEnd) -> str:
+    return f"within {100.0 * end.limit:.0f} cm: {chance_text(end.within)}"
+
+
 def _size_text(deviation: Deviation) -> str:
-    return f"{100.0 * deviation.size:.1f} ± {100.0 * deviation.std:.1f} cm"
+    return spread_text(deviation.size, deviation.half_width)

@@ -27,6 +27,7 @@ def known_of(config: GroundConfig, string: KnownString, hole: SurveyedHole, alar
     return Known(
         target=design.length,
         curvature=math.radians(config.steering_deg_per_m),
+        stop=config.tube_length,
         bit=string.bit,
         worst=worst,
         projection=hole.projection if worst is not None else None,

@@ -75,6 +75,7 @@ def tolerance_alarm_row(a: DeviationAlarm) -> ToleranceAlarmRow:
         md_m=round(a.md, 6),
         deviation_cm=100.0 * a.size,
         sigma_cm=100.0 * a.std,
+        half_width_cm=100.0 * a.half_width,
         threshold_cm=100.0 * a.level * a.limit,
         cleared_at_s=a.cleared_at,
     )

@@ -13,8 +13,10 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.shapes.column_shapes import (
     ColumnAnswer,
     ColumnDeviation,
+    ConeRow,
     DesignAxis,
     DominantAngle,
+    ForeseenEnd,
     HistoryAnswer,
     HistoryMoment,
 )
@@ -22,6 +24,7 @@ from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.answers.thinning import FEWEST, largest_triangles
 from groundstation.service.hole.history import History, Moment
 from groundstation.survey.wall.column_deviation import Deviation, lateral_errors
+from groundstation.survey.wall.projected_end import ConePoint, ProjectedEnd
 
 POINTS, MOST_POINTS = 200, 1000  # of the history
 SHOWN = 30  # numbers that a refusal names
@@ -48,7 +51,8 @@ def answer_column(k: RigModel, p: Parameters) -> ColumnAnswer:
         ),
         stations=[column_deviation(row) for row in rows],
         worst=column_deviation(max(rows, key=lambda row: row.ratio)),
-        projection=None if end is None else column_deviation(end),
+        projection=None if end is None else column_deviation(end.ends),
+        ahead=None if end is None else foreseen_end(end),
         dominant=None if moment is not None else _dominant(k),
     )
 
@@ -74,6 +78,7 @@ def history_moment(moment: Moment) -> HistoryMoment:
         deviation_cm=CM * about.size,
         limit_cm=CM * about.limit,
         used_percent=100.0 * about.ratio,
+        within_percent=None if moment.projection is None else 100.0 * moment.projection.within,
     )
 
 
@@ -99,6 +104,33 @@ def _dominant(k: RigModel) -> DominantAngle | None:
         return None
     found = lateral_errors(k.hole.direction_of(leaning[-1]), k.hole.trajectory[-1].md)
     return DominantAngle(found.name, found.by_inclination, found.by_azimuth)
+
+
+def foreseen_end(end: ProjectedEnd) -> ForeseenEnd:
+    """What is known of the end of a hole."""
+    bend = None if end.way is None else math.hypot(*end.way.path.tendency.curvature.tolist())
+    return ForeseenEnd(
+        within_percent=100.0 * end.within,
+        half_width_cm=CM * end.half_width,
+        surveyed_sigma_cm=CM * end.surveyed_std,
+        bend_deg_per_m=None if bend is None else math.degrees(bend),
+        cone=[cone_row(point) for point in end.cone],
+    )
+
+
+def cone_row(point: ConePoint) -> ConeRow:
+    """One depth of the cone."""
+    mean = point.mean
+    return ConeRow(
+        md_m=round(mean.md, 6),
+        along_m=mean.along,
+        north_cm=CM * float(mean.offset[0]),
+        east_cm=CM * float(mean.offset[1]),
+        deviation_cm=CM * mean.size,
+        half_width_cm=CM * point.half_width,
+        radius_cm=CM * point.radius,
+        limit_cm=CM * mean.limit,
+    )
 
 
 def column_deviation(d: Deviation) -> ColumnDeviation:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.wall.column_deviation import Deviation, Deviations
+from groundstation.survey.wall.projected_end import ProjectedEnd
 
 Array = npt.NDArray[np.float64]
 Few = npt.NDArray[np.float32]
@@ -34,7 +35,7 @@ class Moment:
     at: float  # s, rig time of the newest survey
     where: Array  # (n, 2) m: measured depth and limit of every station
     found: Few  # (n, 6) m and m^2: along, offset (2), covariance (north, both, east)
-    projection: Deviation | None
+    projection: ProjectedEnd | None
 
     @property
     def rows(self) -> list[Deviation]:
@@ -52,7 +53,7 @@ class Moment:
     @property
     def about(self) -> Deviation:
         """What matters: the end, or before that is known the worst station."""
-        return self.projection or max(self.rows, key=lambda row: row.ratio)
+        return self.projection.ends if self.projection else max(self.rows, key=lambda row: row.ratio)
 
 
 class History:
@@ -71,7 +72,7 @@ class History:
             return False
         return epoch > newest_epoch or (epoch == newest_epoch and at > newest_at + SAME_STOP)
 
-    def add(self, rows: Deviations, projection: Deviation | None) -> None:
+    def add(self, rows: Deviations, projection: ProjectedEnd | None) -> None:
         """Keep what is known at the end of a stop."""
         self.count += 1
         where = self._kept_once(np.stack([rows.md, rows.limit], axis=1))

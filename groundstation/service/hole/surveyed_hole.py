@@ -26,7 +26,9 @@ from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.fusion.survey_trust import Trust
 from groundstation.survey.fusion.transport import Carried, carry_directions
-from groundstation.survey.wall.column_deviation import Deviation, Deviations, axis_deviations, project_to_target
+from groundstation.survey.path.curvature_tendency import CurvatureTendency, learn_curvature
+from groundstation.survey.wall.column_deviation import Deviations, axis_deviations
+from groundstation.survey.wall.projected_end import ProjectedEnd, project_to_target
 from groundstation.survey.well.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
@@ -55,7 +57,7 @@ class SurveyedHole:
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
         self._trajectory = Trajectory(collar=config.collar, keeps_columns=False)
         self._deviations = self._deviate()
-        self._projection: Deviation | None = None
+        self._projection: ProjectedEnd | None = None
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
         self._newest_at = -math.inf  # s, rig time of the newest survey
         self.version = 0  # grows with every survey
@@ -165,8 +167,8 @@ class SurveyedHole:
         return self._deviations
 
     @property
-    def projection(self) -> Deviation | None:
-        """Deviation at the target, if the hole goes on straight; None before the first station."""
+    def projection(self) -> ProjectedEnd | None:
+        """Where the hole ends, if it goes on as it tends to; None before the first station."""
         self.settle()
         return self._projection
 
@@ -192,9 +194,16 @@ class SurveyedHole:
         worst = self._deviations.worst(first=1)
         if worst is None:
             return
-        self._projection = project_to_target(self._trajectory[-1], self.direction_of(self._stations[-1]), self._design)
-        self._alarms.judge_deviation("deviation", worst, self._newest_at)
-        self._alarms.judge_deviation("projection", self._projection, self._newest_at)
+        self._projection = project_to_target(
+            self._trajectory[-1], self.direction_of(self._stations[-1]), self._learn(), self._design
+        )
+        self._alarms.judge_deviation(worst, self._newest_at)
+        self._alarms.judge_projection(self._projection, self._newest_at)
+
+    def _learn(self) -> CurvatureTendency:
+        """How the hole bends, by the directions along it."""
+        drawn = self._trajectory
+        return learn_curvature(drawn.md, drawn.tangents, drawn.tangent_covs)
 
     def _directions(self, changed: Sequence[SurveyStation]) -> list[tuple[float, Direction]]:
         """Stations in the hole (m, direction) that may be others than before.

@@ -1,4 +1,4 @@
-"""Is the column where it should be? Deviation from the design axis, tolerance, projection to the target.
+"""Is the column where it should be? Deviation from the design axis, tolerance. Where it will end: `projected_end`.
 
 A design axis is a straight line from its head. At a depth along it the deviation is the part of the offset across it.
 For near-vertical columns inclination matters far more than azimuth; ``Dominant`` says which of the two does here.
@@ -22,7 +22,7 @@ from groundstation.survey.fusion.resolve import Direction, angle_stds, direction
 from groundstation.survey.well.trajectory import TrajectoryPoint
 
 Array = npt.NDArray[np.float64]
-STEEPEST = 0.05  # cosine between hole and axis, below which the hole does not come to the target's depth
+NORMAL_95 = 1.959963984540054  # standard deviations, either side
 ROUNDED = 1e-12  # of a ratio
 LEVELS = (0.5, 0.8, 1.0)  # of the tolerance, at which an alarm is due
 
@@ -139,6 +139,11 @@ class Deviation:
         return math.sqrt(max(float(unit @ self.cov @ unit), 0.0))
 
     @property
+    def half_width(self) -> float:
+        """Half width (m) of the interval that holds the distance with 95 %."""
+        return NORMAL_95 * self.std
+
+    @property
     def ratio(self) -> float:
         """Share of the tolerance that is used up."""
         return self.size / self.limit if self.limit > 0.0 else (math.inf if self.size > 0.0 else 0.0)
@@ -197,40 +202,6 @@ def axis_deviations(md: Array, positions: Array, covs: Array, design: ColumnDesi
 def point_deviation(point: TrajectoryPoint, design: ColumnDesign) -> Deviation:
     """Deviation of one point."""
     return axis_deviations(np.array([point.md]), point.position[None], point.cov[None], design)[0]
-
-
-def project_to_target(point: TrajectoryPoint, direction: Direction, design: ColumnDesign) -> Deviation:
-    """Deviation at the target if the hole goes on straight from a point; its uncertainty grows with the way.
-
-    The direction's own error and that of the position are taken as one (fully correlated), for the last station is in
-    both: the larger of the two possible answers.
-    """
-    offset = point.position - np.array(design.head)
-    axis, across = design.axis, design.across
-    along = float(point.tangent @ axis)
-    if along < STEEPEST:
-        return point_deviation(point, design)
-    rest = (design.length - float(offset @ axis)) / along
-    target = offset + rest * point.tangent
-    if rest <= 0.0:
-        return point_deviation(point, design)
-    # an error along the axis changes how far there is to go: what counts is its trace on the target's plane
-    across = across @ (np.eye(3) - np.outer(point.tangent, axis) / along)
-    down = math.copysign(max(abs(direction.down), 1e-6), direction.down)
-    jacobian = rest * (
-        across @ np.array([[1.0, 0.0], [0.0, 1.0], [-direction.lean[0] / down, -direction.lean[1] / down]])
-    )
-    turned = jacobian @ direction.total_cov @ jacobian.T
-    here = across @ point.cov @ across.T
-    root = _root(here) + _root(turned)
-    return Deviation(
-        point.md + rest, design.length, design.across @ target, root @ root.T, design.tolerance.at(design.length)
-    )
-
-
-def _root(cov: Array) -> Array:
-    values, vectors = np.linalg.eigh(cov)
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
 
 
 @dataclass(frozen=True, slots=True)

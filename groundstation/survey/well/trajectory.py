@@ -133,6 +133,16 @@ class Trajectory:
         return np.asarray(self._rows["md"][: len(self)])
 
     @property
+    def tangents(self) -> Array:
+        """Directions (n, 3) at the points, unit vectors down the hole."""
+        return np.asarray(self._rows["tangent"][: len(self)])
+
+    @property
+    def tangent_covs(self) -> Array:
+        """Covariances (n, 3, 3) of the directions, of each the part that no other shares."""
+        return np.asarray(self._rows["own"][: len(self)])
+
+    @property
     def positions(self) -> Array:
         """Positions (n, 3) of the points, m."""
         return np.asarray(self._rows["position"][: len(self)])

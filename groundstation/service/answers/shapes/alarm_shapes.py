@@ -51,6 +51,7 @@ class ToleranceAlarmRow:
     md_m: MeasuredDepth
     deviation_cm: Annotated[float, "then"]
     sigma_cm: Annotated[float, "standard deviation of the deviation"]
+    half_width_cm: Annotated[float, "it was within this of the deviation with 95 %"]
     threshold_cm: Annotated[float, "passed"]
     cleared_at_s: Annotated[float | None, "rig time"]
 

@@ -42,6 +42,31 @@ class ColumnDeviation:
 
 
 @answer_class
+class ConeRow:
+    """Where the hole will be at one depth, if it goes on as it tends to."""
+
+    md_m: MeasuredDepth
+    along_m: Annotated[float, "along the design axis"]
+    north_cm: Annotated[float, "expected, from the design axis"]
+    east_cm: Annotated[float, "expected, from the design axis"]
+    deviation_cm: Annotated[float, "expected, from the design axis"]
+    half_width_cm: Annotated[float, "of the deviation: it is within this of what is expected with 95 %"]
+    radius_cm: Annotated[float, "of the cone: the hole is within this of the place expected with 95 %"]
+    limit_cm: Annotated[float, "tolerance at this depth"]
+
+
+@answer_class
+class ForeseenEnd:
+    """What is known of where the hole ends, if nothing is steered and it goes on as its own directions say."""
+
+    within_percent: Annotated[float, "chance that it ends within the limit"]
+    half_width_cm: Annotated[float, "of the deviation of the projection: 95 %"]
+    surveyed_sigma_cm: Annotated[float, "standard deviation of the end that is of the surveys alone"]
+    bend_deg_per_m: Annotated[float | None, "curvature of the hole now, as expected; null at its end"]
+    cone: list[ConeRow]
+
+
+@answer_class
 class DominantAngle:
     """Which of two angles makes more of the uncertainty of the toe."""
 
@@ -52,12 +77,13 @@ class DominantAngle:
 
 @answer_class
 class ColumnAnswer:
-    """Deviation from the design axis at every station, and projected to the target."""
+    """Deviation from the design axis at every station, and expected at the target; ``ahead`` says how sure that is."""
 
     design: DesignAxis
     stations: list[ColumnDeviation]
     worst: ColumnDeviation
     projection: ColumnDeviation | None
+    ahead: ForeseenEnd | None
     dominant: DominantAngle | None
 
 
@@ -71,6 +97,7 @@ class HistoryMoment:
     deviation_cm: Annotated[float, "of the end, or before that is known of the worst station"]
     limit_cm: Annotated[float, "tolerance there"]
     used_percent: Annotated[float, "of the tolerance"]
+    within_percent: Annotated[float | None, "chance of ending within it; null before the end is foreseen"]
 
 
 @answer_class
@@ -87,6 +114,8 @@ class Off:
     md_m: MeasuredDepth
     deviation_cm: FromAxis
     sigma_cm: Annotated[float, "standard deviation of it"]
+    half_width_cm: Annotated[float, "it is within this of the deviation with 95 %"]
+    within_percent: Annotated[float, "chance that it is within the limit"]
     limit_cm: Annotated[float, "tolerance there"]
     used_percent: Annotated[float | None, "of the tolerance; null where none is allowed"]
     azimuth_deg: Annotated[float, "towards which the hole is off"]
@@ -95,12 +124,20 @@ class Off:
 
 @answer_class
 class Steer:
-    """Where to steer to, and the last depth from which it helps."""
+    """Where to steer to, and the last depth from which that makes it sure that the hole ends within its limit.
+
+    A correction is taken to bend the hole towards its axis by ``bend_deg_per_m``, beside what the hole does by itself,
+    from there on and by every survey.
+    """
 
     azimuth_deg: Annotated[float, "towards which to steer"]
     wind: Wind
-    before_md_m: Annotated[float | None, "last depth from which a correction still helps"]
-    left_m: Annotated[float | None, "of drilling until there"]
+    before_md_m: Annotated[float, "last depth from which a correction makes the end sure"]
+    left_m: Annotated[float | None, "of drilling until there; less than 0 once it has been passed"]
+    missed: Annotated[bool, "whether it has been passed"]
+    sure_percent: Annotated[float, "chance of ending within that a correction is to bring"]
+    best_percent: Annotated[float, "chance that a correction from now on brings"]
+    bend_deg_per_m: Annotated[float, "most by which the rig bends the hole back, as it was stated"]
 
 
 @answer_class

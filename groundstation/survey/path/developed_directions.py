@@ -1,0 +1,70 @@
+"""Directions of a hole rolled out into a plane, so that a curvature on two axes has a meaning at any inclination.
+
+A frame of two axes across the hole is carried along it without turning about it. In that frame the change of the
+direction from station to station is an angle on two axes, and their sum is the direction rolled out: its derivative is
+the curvature of the hole, its length that of the dogleg.
+Source: Bishop, "There is more than one way to frame a curve", Am. Math. Monthly 82 (1975). rad.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.errors import SurveyError
+
+Array = npt.NDArray[np.float64]
+OPPOSITE = 1e-9  # of 1 + cosine, below which two directions have no shortest turn
+
+
+@dataclass(frozen=True, slots=True)
+class DevelopedDirections:
+    """Angles (n, 2) from the first station on, their covariances (n, 2, 2), and the axes (2, 3) at the last station."""
+
+    angles: Array
+    covs: Array
+    axes: Array
+
+
+def develop_directions(tangents: Array, covs: Array) -> DevelopedDirections:
+    """Roll out the directions of a hole.
+
+    Parameters
+    ----------
+    tangents, covs : (n, 3) unit vectors down the hole, and (n, 3, 3) the covariance of each
+
+    Raises
+    ------
+    SurveyError
+        Where the hole turns back on itself from one station to the next.
+    """
+    cosines = (tangents[:-1] * tangents[1:]).sum(axis=1)
+    if np.any(cosines < OPPOSITE - 1.0):
+        raise SurveyError("path: expected directions that do not turn back on themselves from station to station")
+    turned = np.cross(tangents[:-1], tangents[1:])
+    sines = np.linalg.norm(turned, axis=1)
+    angles = np.arctan2(sines, cosines)
+    toward = tangents[1:] - cosines[:, None] * tangents[:-1]  # of length sine, across the first of the two
+    steps = toward * np.where(sines > 0.0, angles / np.where(sines > 0.0, sines, 1.0), 1.0)[:, None]
+    axes = np.empty((len(tangents), 2, 3))
+    axes[0] = axes_across(tangents[0])
+    for k, (axis, cosine) in enumerate(zip(turned, cosines.tolist(), strict=True)):
+        axes[k + 1] = axes[k] @ shortest_turn(axis, cosine).T
+    changes = np.einsum("kij,kj->ki", axes[:-1], steps)
+    rolled = np.concatenate([np.zeros((1, 2)), np.cumsum(changes, axis=0)])
+    return DevelopedDirections(rolled, axes @ covs @ axes.transpose(0, 2, 1), axes[-1])
+
+
+def axes_across(tangent: Array) -> Array:
+    """Two axes (2, 3) across a direction: north and east turned with it from the vertical, or from straight up."""
+    sense = np.array([0.0, 0.0, 1.0 if tangent[2] >= 0.0 else -1.0])
+    return np.eye(3)[:2] @ shortest_turn(np.cross(sense, tangent), float(sense @ tangent)).T
+
+
+def shortest_turn(turned: Array, cosine: float) -> Array:
+    """Rotation (3, 3) by the shortest way, of the cross product (3,) of two unit vectors and their cosine."""
+    x, y, z = turned.tolist()
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + skew + skew @ skew / (1.0 + cosine)

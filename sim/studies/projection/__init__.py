@@ -1,0 +1,1 @@
+"""Where holes end, foreseen from every depth, against where they do."""
