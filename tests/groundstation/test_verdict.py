@@ -1,4 +1,4 @@
-"""The verdict: five words over what is known, never green on what is old or doubtful, and until where to correct."""
+"""The verdict: five words by stated chances, never green on what is old or doubtful, and until where to correct."""
 
 import math
 from pathlib import Path
@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from schemas import check_answer, shown_on
+from scipy.stats import ncx2
 
 from groundstation.config import GroundConfig
 from groundstation.service.alarms.verdict import (
@@ -16,6 +17,7 @@ from groundstation.service.alarms.verdict import (
     Known,
     VerdictDoubt,
     Word,
+    chance_text,
     compass_point,
     deviation_azimuth,
     judge_hole,
@@ -24,10 +26,12 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.rounding import round_to_std, rounded_std
 from groundstation.service.answers.shapes.answer_fields import fields_of_answer
 from groundstation.service.answers.shapes.column_shapes import Verdict as VerdictAnswer
-from groundstation.service.answers.verdict_views import verdict_line
+from groundstation.service.answers.verdict_views import steering_view, todo_line, verdict_line
+from groundstation.survey.path.normal_mixture import NormalMixture
 from groundstation.survey.wall.column_deviation import Deviation
+from groundstation.survey.wall.projected_end import ProjectedEnd
 
-LENGTH, LIMIT = 20.0, 0.45
+LENGTH, LIMIT, STOP = 20.0, 0.45, 2.0
 CURVATURE = math.radians(0.5)
 
 
@@ -37,86 +41,180 @@ def off(used: float, at: float = LENGTH, towards_deg: float = 253.0, std: float 
     return Deviation(at, at, size * np.array([math.cos(towards), math.sin(towards)]), std**2 * np.eye(2), LIMIT)
 
 
-def known(end: float, worst: float = 0.1, bit: float = 12.0, **more: object) -> Known:
-    return Known(LENGTH, CURVATURE, bit, off(worst, bit), off(end), **more)  # type: ignore[arg-type]
+def ending(used: float, std: float = 0.002, surveyed: float = 0.001, **more: object) -> ProjectedEnd:
+    """An end that is foreseen as one round normal."""
+    ends = off(used, std=std)
+    foreseen = NormalMixture(np.ones(1), ends.offset[None], ends.cov[None])
+    return ProjectedEnd(ends, foreseen, surveyed**2 * np.eye(2), **more)  # type: ignore[arg-type]
+
+
+def known(end: float, worst: float = 0.1, bit: float | None = 12.0, std: float = 0.002, **more: object) -> Known:
+    at = 12.0 if bit is None else bit
+    return Known(LENGTH, CURVATURE, STOP, bit, off(worst, at), ending(end, std), **more)  # type: ignore[arg-type]
+
+
+def chance(used: float, std: float, radius: float = LIMIT) -> float:
+    """Chance of a round normal within a circle: the distance squared is non-central chi-square."""
+    return float(ncx2.cdf((radius / std) ** 2, 2, (used * LIMIT / std) ** 2))
 
 
 @pytest.mark.parametrize(
-    ("worst", "end", "word"),
+    ("worst", "end", "std", "bit", "word"),
     [
-        (0.1, 0.2, Word.ON_TARGET),
-        (0.1, 0.499, Word.ON_TARGET),
-        (0.1, 0.501, Word.WATCH),
-        (0.51, 0.2, Word.WATCH),
-        (0.1, 0.801, Word.STEER),
-        (0.99, 0.81, Word.STEER),
-        (1.001, 0.2, Word.OUT),
-        (1.3, 1.6, Word.OUT),
+        (0.1, 0.2, 0.002, 12.0, Word.ON_TARGET),
+        (0.1, 0.98, 0.002, 12.0, Word.ON_TARGET),  # 4.5 standard deviations within
+        (0.51, 0.2, 0.002, 12.0, Word.WATCH),  # half of the tolerance is used up on the way
+        (0.1, 0.6, 0.1, 12.0, Word.ON_TARGET),
+        (0.1, 0.7, 0.1, 12.0, Word.WATCH),  # 90 %
+        (0.1, 0.95, 0.1, 12.0, Word.WATCH),  # 55 %
+        (0.1, 1.02, 0.1, 12.0, Word.STEER),  # 44 %
+        (0.1, 0.3, 0.45, 2.0, Word.WATCH),  # 38 %, and no steering by what is known now makes it 50 %
+        (0.1, 0.95, 0.1, 14.5, Word.STEER),  # the correction must begin before the next survey
+        (0.1, 0.95, 0.1, 19.0, Word.STEER),  # it is late, and still better than none
+        (0.99, 1.02, 0.1, 12.0, Word.STEER),
+        (1.001, 0.2, 0.002, 12.0, Word.OUT),
+        (1.3, 1.6, 0.002, 12.0, Word.OUT),
     ],
 )
-def test_each_level_of_the_tolerance_has_its_word(worst: float, end: float, word: Word) -> None:
-    found = judge_hole(known(end, worst))
+def test_each_chance_has_its_word(worst: float, end: float, std: float, bit: float, word: Word) -> None:
+    found = judge_hole(known(end, worst, bit, std))
     assert (found.word, found.by_surveys) == (word, word)
 
 
+@given(st.floats(0.0, 2.0), st.floats(0.002, 0.6), st.floats(0.0, 19.8))
+def test_the_words_are_what_their_chances_say(end: float, std: float, bit: float) -> None:
+    """Each word against its definition by non-central chi-square."""
+    found = judge_hole(known(end, bit=bit, std=std))
+    now = chance(end, std)
+    corrected = chance(end, std, LIMIT + 0.5 * CURVATURE * (LENGTH - bit) ** 2)
+    if now > 0.9501:
+        assert found.word is Word.ON_TARGET
+    elif now < 0.9499:
+        assert found.word is not Word.ON_TARGET
+        assert (found.word is Word.OUT) == (corrected < 0.5) or abs(corrected - 0.5) < 1e-4
+        late = corrected < 0.9499
+        more_out_than_in = now < 0.4999 and chance(0.0, std) > 0.5001
+        if corrected > 0.5001 and (late or more_out_than_in):
+            assert found.word is Word.STEER
+
+
 def test_the_line_of_a_hole_that_is_to_be_steered() -> None:
-    facts = known(0.9733)
-    assert (
-        verdict_line(judge_hole(facts))
-        == "STEER: ends 43.8 ± 0.2 cm at 253 deg WSW; limit 45 (97 %); act before 13.0 m"
+    """38 cm and 12 cm of 95 %: the numbers of the line are those of the normal that was given."""
+    facts = known(38.0 / 45.0, std=0.12 / 1.96, bit=10.0)
+    assert chance(38.0 / 45.0, 0.12 / 1.96) == pytest.approx(0.857, abs=0.0005)
+    assert verdict_line(judge_hole(facts)) == (
+        "WATCH: ends 38 ± 12 cm (95 %) at 253 deg WSW; within 45 cm: 86 %; act before 17.2 m"
     )
+    late = judge_hole(known(38.0 / 45.0, std=0.12 / 1.96, bit=17.5))
+    assert verdict_line(late) == "STEER: ends 38 ± 12 cm (95 %) at 253 deg WSW; within 45 cm: 86 %; act at once"
+
+
+def test_a_deadline_that_was_missed_says_so_and_stays_where_it_was() -> None:
+    """It never becomes another goal: the depth stays, and what can still be had is told beside it."""
+    deadlines = []
+    for bit in np.linspace(2.0, 19.5, 36):
+        found = judge_hole(known(1.0, bit=float(bit), std=0.1))
+        assert found.deadline is not None
+        deadlines.append(found.deadline.before)
+        assert found.deadline.is_missed == (bit > found.deadline.before)
+        assert found.deadline.left == pytest.approx(found.deadline.before - bit)
+        if found.deadline.is_missed and found.word is Word.STEER:
+            facts = known(1.0, bit=float(bit), std=0.1)
+            way = steering_view(found.about, found.deadline, facts)  # type: ignore[arg-type]
+            assert way.missed
+            told = todo_line(found, way)
+            assert "at once: 95 % was to be had until" in told
+            assert told.endswith(f"now {chance_text(0.01 * way.best_percent)} at best")
+    assert max(deadlines) - min(deadlines) < 1e-9
+
+
+@given(end=st.floats(0.5, 2.5), std=st.floats(0.005, 0.3), bit=st.floats(0.0, 19.5))
+def test_a_correction_begun_in_time_makes_the_end_sure(end: float, std: float, bit: float) -> None:
+    """Bent back from the deadline on, nearer by what that moves, it ends within by just 95 %; and so does ``best``."""
+    found = judge_hole(known(end, bit=bit, std=std))
+    if found.deadline is None:
+        assert chance(end, std) > 0.9499
+        return
+    moved = 0.5 * CURVATURE * (LENGTH - found.deadline.before) ** 2
+    assert chance(end, std, LIMIT + moved) == pytest.approx(0.95, abs=1e-5)
+    from_now = 0.5 * CURVATURE * (LENGTH - bit) ** 2
+    assert found.deadline.best == pytest.approx(chance(end, std, LIMIT + from_now), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("end", "std", "word", "line"),
+    [
+        (0.3, 0.002, Word.ON_TARGET, "ON TARGET: ended 13.5 ± 0.4 cm (95 %) at 253 deg WSW; within 45 cm: > 99 %"),
+        (0.95, 0.03, Word.WATCH, "WATCH: ended 42.8 ± 5.9 cm (95 %) at 253 deg WSW; within 45 cm: 76 %"),
+        (1.05, 0.03, Word.OUT, "OUT: ended 47.2 ± 5.9 cm (95 %) at 253 deg WSW; within 45 cm: 22 %"),
+    ],
+)
+def test_at_its_depth_nothing_is_advised(end: float, std: float, word: Word, line: str) -> None:
+    facts = Known(LENGTH, CURVATURE, STOP, LENGTH, off(0.1), ending(end, std, is_reached=True))
+    found = judge_hole(facts)
+    assert (found.word, found.deadline, verdict_line(found)) == (word, None, line)
+    assert todo_line(found, None) == "the hole is at its depth: nothing is left to steer"
+
+
+def test_a_bit_at_the_end_is_not_steered_although_its_survey_is_to_come() -> None:
+    found = judge_hole(known(0.95, bit=LENGTH, std=0.1))
+    assert (found.word, found.deadline) == (Word.WATCH, None)
 
 
 def test_a_hole_that_cannot_be_brought_back_is_out_before_it_is_outside() -> None:
     facts = known(1.5, bit=18.0)
     assert judge_hole(facts).word is Word.OUT
-    assert "no correction can bring it back" in judge_hole(facts).why[0]
+    assert judge_hole(facts).why[0] == "within 45 cm: 0 %; 95 % was to be had until 12.8 m, now 0 % at best"
     assert judge_hole(known(1.5, bit=2.0)).word is Word.STEER
 
 
-def test_too_uncertain_to_tell_is_not_on_target() -> None:
-    facts = Known(LENGTH, CURVATURE, 12.0, off(0.1, 12.0), off(0.2, std=0.23))
+def test_a_hole_that_does_not_come_to_its_depth_is_out() -> None:
+    found = judge_hole(Known(LENGTH, CURVATURE, STOP, 12.0, off(0.1), ending(0.1, comes_there=False)))
+    assert (found.word, found.by_surveys) == (Word.OUT, Word.OUT)
+
+
+def test_surveys_too_uncertain_to_tell_are_not_on_target() -> None:
+    """What the ground may still do is a chance; what the surveys leave open is not known."""
+    facts = Known(LENGTH, CURVATURE, STOP, 12.0, off(0.1, 12.0), ending(0.2, std=0.3, surveyed=0.23))
     assert judge_hole(facts).word is Word.DONT_KNOW
     assert judge_hole(facts).doubts == (VerdictDoubt.UNCERTAIN,)
-    nearly = Known(LENGTH, CURVATURE, 12.0, off(0.1, 12.0), off(0.45, std=0.15))
+    assert judge_hole(facts).why == ("the surveys leave the end open by ±46 cm, the limit is 45 cm",)
+    nearly = Known(LENGTH, CURVATURE, STOP, 10.0, off(0.1, 10.0), ending(0.45, std=0.25, surveyed=0.15))
     assert judge_hole(nearly).word is Word.WATCH
 
 
 @given(
     worst=st.floats(0.0, 3.0),
     end=st.floats(0.0, 3.0),
-    std=st.floats(0.0, 1.0),
+    std=st.floats(1e-4, 1.0),
+    surveyed=st.floats(1e-4, 1.0),
     bit=st.none() | st.floats(0.0, LENGTH),
     doubts=st.lists(st.sampled_from(list(VerdictDoubt)), max_size=3),
 )
-def test_it_is_never_green_on_what_is_doubtful_and_never_better_than_the_tolerance(
-    worst: float, end: float, std: float, bit: float | None, doubts: list[VerdictDoubt]
+def test_it_is_never_green_on_what_is_doubtful_and_never_better_than_its_chance(
+    worst: float, end: float, std: float, surveyed: float, bit: float | None, doubts: list[VerdictDoubt]
 ) -> None:
-    facts = Known(
-        LENGTH, CURVATURE, bit, off(worst, 10.0, std=std), off(end, std=std), tuple((d, d.value) for d in doubts)
-    )
+    told = tuple((doubt, doubt.value) for doubt in doubts)
+    facts = Known(LENGTH, CURVATURE, STOP, bit, off(worst, 10.0, std=std), ending(end, std, surveyed), told)
     found = judge_hole(facts)
     if doubts:
         assert found.word is Word.DONT_KNOW
         assert found.why[: len(doubts)] == tuple(d.value for d in doubts)
     if found.word is Word.ON_TARGET:
-        assert max(worst, end) < 0.5
-        assert end * LIMIT + 2.0 * std < LIMIT
+        assert worst < 0.5
+        assert chance(end, std) > 0.9499
+        assert 2.0 * surveyed < LIMIT
     if worst >= 1.001:
         assert found.by_surveys is Word.OUT
     assert verdict_line(found)
 
 
-@given(end=st.floats(0.81, 2.0), bit=st.floats(0.0, LENGTH))
-def test_a_correction_begun_in_time_ends_where_it_says(end: float, bit: float) -> None:
-    """Bent back from there by the rig's curvature, the hole ends at the lowest level, or at the limit if late."""
-    found = judge_hole(known(end, bit=bit))
-    if found.act_before is None or found.left is None or found.left < 0.0:
-        return
-    moved = 0.5 * CURVATURE * (LENGTH - found.act_before) ** 2
-    reached = (end * LIMIT - moved) / LIMIT
-    assert any(reached == pytest.approx(level) for level in (0.5, 1.0)) or (end < 1.0 and found.act_before == LENGTH)
-    assert found.act_before == pytest.approx(bit + found.left)
+@pytest.mark.parametrize(
+    ("of", "text"),
+    [(0.0, "0 %"), (0.004, "< 1 %"), (0.12, "12 %"), (0.99, "99 %"), (0.996, "> 99 %"), (1.0, "100 %")],
+)
+def test_a_chance_is_never_told_as_certain(of: float, text: str) -> None:
+    assert chance_text(of) == text
 
 
 @given(azimuth_deg=st.floats(-720.0, 720.0))
@@ -154,7 +252,7 @@ def test_a_ground_station_that_knows_nothing_says_so(tmp_path: Path) -> None:
 
 
 def test_a_verdict_without_a_deviation_has_a_line() -> None:
-    nothing = Known(LENGTH, CURVATURE)
+    nothing = Known(LENGTH, CURVATURE, STOP)
     assert judge_hole(nothing) == HoleVerdict(
         Word.DONT_KNOW, Word.DONT_KNOW, ("no station has been surveyed yet",), (VerdictDoubt.NO_SURVEY,)
     )

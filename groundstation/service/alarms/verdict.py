@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 
 from groundstation.service.alarms.spread_text import spread_text
 from groundstation.survey.wall.column_deviation import LEVELS, Deviation
-from groundstation.survey.wall.projected_end import ProjectedEnd
+from groundstation.survey.wall.projected_end import REACHED, ProjectedEnd
 
 LOWEST, _, LIMIT = LEVELS  # of the tolerance, of what was drilled
 SURE = 0.95  # chance of ending within, from which on it is on target; a correction is to bring it there
@@ -67,6 +67,12 @@ class Known:
     projection: ProjectedEnd | None = None  # at the target, if the hole goes on as it tends to
     doubts: tuple[tuple[VerdictDoubt, str], ...] = ()
 
+    @property
+    def is_at_end(self) -> bool:
+        """Whether nothing is left to drill: by the bit, or by the deepest survey."""
+        by_bit = self.bit is not None and self.bit >= self.target - REACHED
+        return by_bit or (self.projection is not None and self.projection.is_reached)
+
 
 @dataclass(frozen=True, slots=True)
 class Deadline:
@@ -91,7 +97,8 @@ class HoleVerdict:
     """The answer, and what it rests on.
 
     ``by_surveys`` is what the surveys say, whatever is doubtful now. ``about`` is the deviation that decided and
-    ``end`` the projection, where it is about that; ``deadline`` is absent where nothing is to be steered.
+    ``end`` the projection, where it is about that; ``deadline`` is absent where nothing is to be steered, and
+    ``is_at_end`` is whether nothing can be.
     """
 
     word: Word
@@ -102,6 +109,7 @@ class HoleVerdict:
     about: Deviation | None = None
     end: ProjectedEnd | None = None
     deadline: Deadline | None = None
+    is_at_end: bool = False
 
 
 def judge_hole(known: Known) -> HoleVerdict:
@@ -135,10 +143,9 @@ def judge_surveys(known: Known) -> HoleVerdict:
         used = f"{100.0 * worst.ratio:.0f} % of the tolerance"
         why = f"{_size_text(worst)} off at {worst.md:.1f} m, {used}; {_within_text(end)}"
         return HoleVerdict(Word.WATCH, Word.WATCH, (why,), (), "deviation", worst)
-    needs_none = end.is_reached or end.within >= SURE
-    deadline = None if needs_none else correction_deadline(end, known)
+    deadline = None if known.is_at_end or end.within >= SURE else correction_deadline(end, known)
     word, why = _word_of(end, deadline, known.stop)
-    return HoleVerdict(word, word, (why,), (), "projection", end.ends, end, deadline)
+    return HoleVerdict(word, word, (why,), (), "projection", end.ends, end, deadline, known.is_at_end)
 
 
 def _word_of(end: ProjectedEnd, deadline: Deadline | None, stop: float) -> tuple[Word, str]:

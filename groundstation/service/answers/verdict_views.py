@@ -119,7 +119,7 @@ def verdict_line(found: HoleVerdict) -> str:
 def todo_line(found: HoleVerdict, way: Steer | None) -> str:
     """What to do, in a line for a screen."""
     match found.word:
-        case _ if found.end is not None and found.end.is_reached and found.word is not Word.DONT_KNOW:
+        case Word.ON_TARGET | Word.WATCH | Word.OUT if found.is_at_end:
             return "the hole is at its depth: nothing is left to steer"
         case Word.ON_TARGET:
             return "go on"

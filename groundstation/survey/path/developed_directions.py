@@ -58,9 +58,13 @@ def develop_directions(tangents: Array, covs: Array) -> DevelopedDirections:
 
 
 def axes_across(tangent: Array) -> Array:
-    """Two axes (2, 3) across a direction: north and east turned with it from the vertical, or from straight up."""
-    sense = np.array([0.0, 0.0, 1.0 if tangent[2] >= 0.0 else -1.0])
-    return np.eye(3)[:2] @ shortest_turn(np.cross(sense, tangent), float(sense @ tangent)).T
+    """Two axes (2, 3) across a direction: north and east turned with it from straight down, north and west from up."""
+    down = 1.0 if tangent[2] >= 0.0 else -1.0
+    sense = np.array([0.0, 0.0, down])
+    return (
+        np.array([[1.0, 0.0, 0.0], [0.0, down, 0.0]])
+        @ shortest_turn(np.cross(sense, tangent), float(sense @ tangent)).T
+    )
 
 
 def shortest_turn(turned: Array, cosine: float) -> Array:

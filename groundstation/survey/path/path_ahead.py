@@ -19,7 +19,7 @@ from groundstation.survey.path.curvature_tendency import CurvatureTendency
 from groundstation.survey.path.normal_mixture import NormalMixture
 
 Array = npt.NDArray[np.float64]
-PLACES, SHARES = np.polynomial.legendre.leggauss(4)  # of a jump ahead, in parts of the way
+PLACES, SHARES = np.polynomial.legendre.leggauss(6)  # of a jump ahead, in parts of the way
 ENDLESS = 1e6  # m, over which a jump is kept
 
 

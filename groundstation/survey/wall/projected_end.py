@@ -25,6 +25,7 @@ from groundstation.survey.well.trajectory import TrajectoryPoint
 Array = npt.NDArray[np.float64]
 STEEPEST = 0.05  # cosine between hole and axis, below which the hole does not come to the target's depth
 CONE_POINTS = 8  # below the last station
+REACHED = 0.1  # m, of the way to the end, within which a hole is at its depth
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,4 +153,5 @@ def project_to_target(
     way = WayAhead(point.md, rest, offset, point.tangent, onto_plane, path, design)
     foreseen = way.foreseen(1.0)
     turned = way.onto_plane @ tendency.axes.T
-    return ProjectedEnd(way.deviation(1.0, foreseen), foreseen, turned @ path.measured(rest) @ turned.T, way=way)
+    measured = turned @ path.measured(rest) @ turned.T
+    return ProjectedEnd(way.deviation(1.0, foreseen), foreseen, measured, is_reached=rest <= REACHED, way=way)

@@ -1,4 +1,4 @@
-"""Deviation of a column from its design axis: tolerances, rotations, levels, projection, dominant angle."""
+"""Deviation of a column from its design axis: tolerances, rotations, levels, dominant angle."""
 
 import math
 
@@ -17,7 +17,6 @@ from groundstation.survey.wall.column_deviation import (
     lateral_errors,
     parse_tolerance,
     point_deviation,
-    project_to_target,
 )
 from groundstation.survey.well.trajectory import TrajectoryPoint
 
@@ -177,68 +176,6 @@ def test_where_no_deviation_is_allowed_any_is_too_much() -> None:
 def test_without_a_deviation_its_uncertainty_is_that_of_the_worst_direction() -> None:
     found = Deviation(10.0, 10.0, np.zeros(2), np.array([[5.0, 3.0], [3.0, 5.0]]) * 1e-4, 0.25)
     assert found.std == pytest.approx(math.sqrt(8e-4))
-
-
-def test_a_hole_is_projected_straight_ahead_to_the_target() -> None:
-    tilt = 1.0 * DEG
-    tangent = np.array([0.0, math.sin(tilt), math.cos(tilt)])
-    point = point_at([0.02, 0.05, 10.0], tangent, md=10.1)
-    found = project_to_target(point, lean_of(tilt, 90.0 * DEG, 1e-6 * np.eye(2)), ColumnDesign())
-    np.testing.assert_allclose(found.offset, [0.02, 0.05 + 20.0 * math.tan(tilt)], atol=1e-12)
-    assert found.md == pytest.approx(10.1 + 20.0 / math.cos(tilt))
-    assert found.along == 30.0
-    assert found.limit == pytest.approx(0.65)
-
-
-def test_the_uncertainty_of_a_projection_grows_with_the_way() -> None:
-    direction, cov = lean_of(0.0, 0.0, 4e-6 * np.eye(2)), 9e-6 * np.eye(3)
-    stds = [
-        project_to_target(point_at([0.0, 0.0, z], cov=cov), direction, ColumnDesign()).std
-        for z in (0.0, 10.0, 20.0, 29.0)
-    ]
-    np.testing.assert_allclose(stds, [0.003 + 0.002 * way for way in (30.0, 20.0, 10.0, 1.0)], rtol=1e-6)
-
-
-def test_a_projection_counts_what_the_direction_shares() -> None:
-    direction = Direction(np.zeros(2), 1.0, 1e-6 * np.eye(2), np.array([[0.0], [3e-3]]))
-    found = project_to_target(point_at([0.0, 0.0, 20.0], cov=np.zeros((3, 3))), direction, ColumnDesign())
-    np.testing.assert_allclose(found.cov, np.diag([1e-4, 1e-4 + 9e-4]), atol=1e-12)
-
-
-def test_beyond_the_target_nothing_is_projected() -> None:
-    point = point_at([0.1, 0.0, 31.0], np.array([math.sin(0.1), 0.0, math.cos(0.1)]))
-    found = project_to_target(point, lean_of(0.1, 0.0, 1e-6 * np.eye(2)), ColumnDesign())
-    np.testing.assert_allclose(found.offset, [0.1, 0.0])
-    assert found.along == pytest.approx(31.0)
-
-
-def test_a_hole_along_an_inclined_axis_stays_on_it() -> None:
-    design = ColumnDesign(inclination=40.0 * DEG, azimuth=200.0 * DEG, length=25.0)
-    direction = lean_of(40.0 * DEG, 200.0 * DEG, 1e-6 * np.eye(2))
-    found = project_to_target(point_at(10.0 * design.axis, design.axis), direction, design)
-    assert found.size == pytest.approx(0.0, abs=1e-12)
-    assert found.md == pytest.approx(25.0)
-
-
-@pytest.mark.parametrize("off", [0.5 * DEG, 2.0 * DEG])
-def test_the_uncertainty_of_a_projection_is_the_slope_of_the_target(off: float) -> None:
-    design = ColumnDesign(inclination=30.0 * DEG, azimuth=50.0 * DEG)
-    inclination, azimuth, cov = 30.0 * DEG + off, 48.0 * DEG, np.array([[2e-6, 5e-7], [5e-7, 1e-6]])
-
-    def target(north: float, east: float) -> np.ndarray:
-        lean = lean_of(inclination, azimuth, cov).lean + np.array([north, east])
-        direction = Direction(lean, math.sqrt(1.0 - float(lean @ lean)), cov, np.zeros((2, 0)))
-        tangent = np.array([*lean, direction.down])
-        return project_to_target(point_at(5.0 * design.axis, tangent, np.zeros((3, 3))), direction, design).offset
-
-    step = 1e-6
-    slope = np.stack([target(step, 0.0) - target(-step, 0.0), target(0.0, step) - target(0.0, -step)], axis=1)
-    slope = slope / (2.0 * step)
-    direction = lean_of(inclination, azimuth, cov)
-    tangent = np.array([*direction.lean, direction.down])
-    found = project_to_target(point_at(5.0 * design.axis, tangent, np.zeros((3, 3))), direction, design)
-    expected = slope @ cov @ slope.T
-    np.testing.assert_allclose(found.cov, expected, atol=0.01 * float(np.trace(expected)))
 
 
 def with_angle_stds(inclination: float, std_i: float, std_a: float) -> Direction:

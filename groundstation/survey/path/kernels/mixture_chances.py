@@ -20,6 +20,8 @@ from node.kernels.arithmetic.jit import kernel
 Array = npt.NDArray[np.float64]
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(40)
 REACH = 8.0  # standard deviations that are integrated over
+SAME, ROUNDISH = 1e-9, 3.0  # of two standard deviations, up to which they are one, and up to which either axis will do
+STEEP, MOST_PANELS = 6.0, 40  # standard deviations by which the chord may change in one panel of nodes; panels
 ROOT_TWO, ROOT_TWO_PI = math.sqrt(2.0), math.sqrt(2.0 * math.pi)
 LEAST = 1e-12  # m, of a standard deviation
 CLOSE = 1e-9  # of a chance that is looked for
@@ -42,15 +44,23 @@ def one_within_circle(x: float, y: float, xx: float, xy: float, yy: float, radiu
     wide, narrow = math.sqrt(max(middle + half, 0.0)) + LEAST, math.sqrt(max(middle - half, 0.0)) + LEAST
     cos, sin = math.cos(turn), math.sin(turn)
     along, across = cos * x + sin * y, cos * y - sin * x
+    if wide - narrow < SAME * wide:  # round: any axis is one of its own
+        wide = narrow = math.sqrt(max(middle, 0.0)) + LEAST
+        along, across = math.hypot(x, y), 0.0
+    elif wide < ROUNDISH * narrow and abs(across) > abs(along):  # the chord changes least where its end is far off
+        wide, narrow, along, across = narrow, wide, across, along
     first = math.asin(min(max((across - REACH * narrow) / radius, -1.0), 1.0))
     last = math.asin(min(max((across + REACH * narrow) / radius, -1.0), 1.0))
-    total = 0.0
-    for k in range(len(NODES)):
-        t = 0.5 * (first + last) + 0.5 * (last - first) * NODES[k]
-        chord, off = radius * math.cos(t), (radius * math.sin(t) - across) / narrow
-        density = math.exp(-0.5 * off * off) / (ROOT_TWO_PI * narrow)
-        total += WEIGHTS[k] * chord * density * normal_between((-chord - along) / wide, (chord - along) / wide)
-    return 0.5 * (last - first) * total
+    changed = radius * max(abs(math.cos(first) - math.cos(last)), abs(1.0 - math.cos(first)) * (first * last < 0.0))
+    panels = 1 + min(int(changed / (STEEP * wide)), MOST_PANELS)
+    total, width = 0.0, (last - first) / panels
+    for place in range(panels):
+        for k in range(len(NODES)):
+            t = first + (place + 0.5 + 0.5 * NODES[k]) * width
+            chord, off = radius * math.cos(t), (radius * math.sin(t) - across) / narrow
+            density = math.exp(-0.5 * off * off) / (ROOT_TWO_PI * narrow)
+            total += WEIGHTS[k] * chord * density * normal_between((-chord - along) / wide, (chord - along) / wide)
+    return 0.5 * width * total
 
 
 @kernel
