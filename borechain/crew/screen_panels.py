@@ -39,10 +39,15 @@ def verdict_panel(picture: Picture, now: float) -> Text:
     """Three lines: the word and the numbers, what to do, why."""
     found = picture.verdict(now)
     style = STYLES[found["verdict"]]
-    lines = [found["line"], found["todo"], "; ".join(found["why"])]
+    lines = [short_line(found["line"]), found["todo"], "; ".join(found["why"])]
     if found["verdict"] == "dont_know" and found["by_surveys"] != "dont_know":
         lines[1] = f"the surveys alone said {found['by_surveys'].replace('_', ' ')}; do not count on it"
     return Text("\n").join(fit_line(f" {line}", style) for line in lines)
+
+
+def short_line(line: str) -> str:
+    """The verdict's line; where it is too long without its deadline, which is in the line below it."""
+    return line if len(line) < WIDTH else line.partition("; act ")[0]
 
 
 def plan_panel(picture: Picture) -> Text:
@@ -80,22 +85,37 @@ def strip_panel(picture: Picture) -> Text:
     column = picture.answers.get("column")
     rows = [] if column is None else column["stations"][1:][-(PLAN_HEIGHT - 2) :]
     lines = [Text("  MD m  of the tolerance".ljust(STRIP_WIDTH), "bold")]
-    lines += [strip_row(row, "=") for row in rows]
+    lines += [strip_row(row) for row in rows]
     if column is not None and column["projection"] is not None:
-        lines.append(strip_row(column["projection"], "-"))
+        lines.append(ending_row(column["projection"], column["ahead"]))
     return Text("\n").join(lines)
 
 
-def strip_row(row: View, mark: str) -> Text:
+def strip_row(row: View) -> Text:
     """One depth of the strip."""
     used, cells = row["used_percent"], 12
-    bar = [mark if cells * used / 100.0 > k else " " for k in range(cells)]
+    bar = ["=" if cells * used / 100.0 > k else " " for k in range(cells)]
     for level in (0.5, 0.8):
         if bar[int(level * cells)] == " ":
             bar[int(level * cells)] = ":"
     style = "bold red" if used >= 100.0 else "yellow" if used >= 80.0 else ""
-    name = f"{row['md_m']:6.1f}" if mark == "=" else " ends "
-    return Text(f"{name} |{''.join(bar)}|{used:4.0f}%".ljust(STRIP_WIDTH), style)
+    return Text(f"{row['md_m']:6.1f} |{''.join(bar)}|{used:4.0f}%".ljust(STRIP_WIDTH), style)
+
+
+def ending_row(row: View, ahead: View) -> Text:
+    """Where it ends: the interval of 95 % as a bar, the place expected in it, and the chance of ending within."""
+    cells, limit = 12, row["limit_cm"]
+    low, at, high = (
+        cells * (row["deviation_cm"] + side * ahead["half_width_cm"]) / limit if limit > 0.0 else math.inf
+        for side in (-1.0, 0.0, 1.0)
+    )
+    bar = ["-" if low < k + 1 and high > k else " " for k in range(cells)]
+    if at < cells:
+        bar[int(at)] = "x"
+    beyond = ">" if high > cells else "|"
+    within = ahead["within_percent"]
+    style = "bold red" if within < 50.0 else "yellow" if within < 95.0 else ""
+    return Text(f" ends |{''.join(bar)}{beyond}P{within:3.0f}%".ljust(STRIP_WIDTH), style)
 
 
 def string_panel(picture: Picture) -> Text:

@@ -20,7 +20,7 @@ def rig_result(answers: dict[str, Any], world: World) -> dict[str, Any]:
         "stations": stations,
         "figures": figures_of_merit(stations, measurements, world),
         "measurements": len(measurements),
-        "column": {key: answers["column"][key] for key in ("worst", "projection", "dominant")},
+        "column": {key: answers["column"][key] for key in ("worst", "projection", "ahead", "dominant")},
         "missing": missing_surveys(measurements, world),
         "alarms": answers["alarms"]["active"],
         "rig_alarms": answers["alarms"]["rig"],

@@ -292,6 +292,31 @@ STUDIES = by_name(
             short="--seeds 2",
         ),
         Study(
+            "projection",
+            "Where holes of seven kinds end, foreseen from every depth: inside the cone, score, and chances.",
+            f"{MODULES}.projection",
+            (
+                ResultTable("Ends of {holes} holes", table_columns.PROJECTION, table_columns.PROJECTION),
+                ResultTable(
+                    "By kind of hole", table_columns.INSIDE, table_columns.INSIDE, rows="kinds", suffix="-kinds"
+                ),
+                ResultTable(
+                    "In other grounds", table_columns.INSIDE, table_columns.INSIDE, rows="grounds", suffix="-grounds"
+                ),
+                ResultTable(
+                    "Chance of ending within, in bins",
+                    table_columns.RELIABILITY,
+                    table_columns.RELIABILITY,
+                    rows="reliability",
+                    suffix="-reliability",
+                ),
+            ),
+            (Option("holes", 1000, 7, 1_000_000, help="Of all kinds together."), SEED),
+            counts="parts",
+            full=("--holes 1000",),
+            short="--holes 7",
+        ),
+        Study(
             "ingredients",
             "Yaw at rest and rotating with one ingredient of the filter or of its sensors switched off at a time.",
             f"{MODULES}.ingredients",

@@ -240,3 +240,26 @@ FIELD: Columns = (
     ("azimuth_rms_deg", "azimuth rms, deg"),
     ("reached", "reached"),
 )
+PROJECTION: Columns = (
+    ("case", "from"),
+    ("inside_percent", "inside the cone of 95 %, %"),
+    ("radius_cm", "median radius, cm"),
+    ("rms_cm", "rms on an axis, cm"),
+    ("score_cm", "score, cm"),
+    ("score_straight_cm", "straight on, cm"),
+    ("score_constant_cm", "curvature of now, cm"),
+    ("deadline_percent", "within the distance of the deadline, %"),
+)
+INSIDE: Columns = (
+    ("case", "holes"),
+    ("holes", "number"),
+    ("inside_percent", "inside the cone of 95 %, %"),
+    ("least_percent", "at the worst depth, %"),
+    ("most_percent", "at the best, %"),
+)
+RELIABILITY: Columns = (
+    ("case", "chance"),
+    ("holes", "holes"),
+    ("stated_percent", "stated, %"),
+    ("observed_percent", "observed, %"),
+)

@@ -65,7 +65,7 @@ def test_an_alarm_of_the_projection_says_what_is_expected_and_how_surely() -> No
 
 
 def test_a_spread_alone_raises_nothing() -> None:
-    """At the first survey nobody knows where the hole ends, and there is nothing to steer against."""
+    """At the first survey the end is open, and there is nothing to steer against."""
     alarms = AlarmList()
     assert not alarms.judge_projection(ending(0.1, std=0.2), 1.0)
     assert alarms.active == []

@@ -21,12 +21,44 @@ def said(rig: Rig) -> str:
     return str(rig.ask("verdict")["verdict"])
 
 
-def test_a_hole_that_drifts_off_is_watched_then_steered_then_out(rig: Rig) -> None:
-    seen = [said(rig)]
-    for stop, inclination_deg in enumerate((1.0, 1.6, 2.0, 6.0, 8.0), 4):
+@pytest.mark.parametrize(
+    ("inclinations_deg", "words"),
+    [
+        ((0.45, 0.65, 0.9, 1.5, 8.0), ["on_target", "on_target", "on_target", "watch", "out"]),
+        ((1.0, 1.6, 2.0, 6.0, 8.0), ["steer", "steer", "steer", "out", "out"]),  # a bend of 0.35 deg/m begins
+    ],
+)
+def test_a_hole_that_drifts_off_is_watched_then_steered_then_out(
+    rig: Rig, inclinations_deg: tuple[float, ...], words: list[str]
+) -> None:
+    seen = []
+    assert said(rig) == "on_target"
+    for stop, inclination_deg in enumerate(inclinations_deg, 4):
         rig.drill(stop, inclination_deg)
         seen.append(said(rig))
-    assert seen == ["on_target", "watch", "steer", "steer", "out", "out"]
+    assert seen == words
+
+
+def test_the_published_bore_is_foreseen_within_what_is_said_of_it(tmp_path: Path) -> None:
+    """Wellbore 1 ended 51.5 cm off: from 2 m on each end that is told holds that with its own 95 %."""
+    rig = Rig(tmp_path, target=20.0)
+    rig.run(5.0)
+    for stop, inclination_deg in enumerate((0.08, 0.32, 0.59, 0.89, 1.32, 1.70, 2.36, 2.80, 3.00), 1):
+        rig.drill(stop, inclination_deg)
+        off = rig.ask("column")
+        assert abs(off["projection"]["deviation_cm"] - 51.5) < off["ahead"]["half_width_cm"] + 0.1
+    assert said(rig) == "out"
+    rig.ground.close()
+
+
+def test_at_its_depth_the_verdict_stops_advising(rig: Rig) -> None:
+    for stop in range(4, 11):
+        rig.drill(stop, 0.3)
+    answer = rig.ask("verdict")
+    assert answer["verdict"] == "on_target"
+    assert answer["line"].startswith("ON TARGET: ended 9.9 ± ")
+    assert (answer["steer"], answer["todo"]) == (None, "the hole is at its depth: nothing is left to steer")
+    assert rig.ask("column")["ahead"]["within_percent"] > 99.0
 
 
 def test_what_to_do_stands_beside_the_word(rig: Rig) -> None:

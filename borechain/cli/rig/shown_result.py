@@ -53,6 +53,9 @@ def show_column(result: dict[str, Any]) -> None:
                 f"column {name:15} {d['deviation_cm']:.1f} ± {d['sigma_cm']:.2f} cm "
                 f"towards {d['direction_deg']:.0f} deg at {d['md_m']:.1f} m, {d['used_percent']:.0f} % of the tolerance"
             )
+    if (ahead := result["column"]["ahead"]) is not None:
+        within, spread = ahead["within_percent"], ahead["half_width_cm"]
+        click.echo(f"column {'ends':15} ± {spread:.1f} cm (95 %), within its limit with {within:.0f} %")
     for alarm in result["alarms"]:
         click.echo(f"alarm  {alarm['kind']:15} {alarm['level_percent']} % of the tolerance at {alarm['md_m']:.1f} m")
 

@@ -142,7 +142,7 @@ def judge_surveys(known: Known) -> HoleVerdict:
     if end.within >= SURE and worst.ratio >= LOWEST:
         used = f"{100.0 * worst.ratio:.0f} % of the tolerance"
         why = f"{_size_text(worst)} off at {worst.md:.1f} m, {used}; {_within_text(end)}"
-        return HoleVerdict(Word.WATCH, Word.WATCH, (why,), (), "deviation", worst)
+        return HoleVerdict(Word.WATCH, Word.WATCH, (why,), (), "deviation", worst, is_at_end=known.is_at_end)
     deadline = None if known.is_at_end or end.within >= SURE else correction_deadline(end, known)
     word, why = _word_of(end, deadline, known.stop)
     return HoleVerdict(word, word, (why,), (), "projection", end.ends, end, deadline, known.is_at_end)

@@ -24,7 +24,7 @@ STEEPEST = math.radians(60.0)  # inclination of a design
 
 
 @dataclass(frozen=True, slots=True)
-class Ground:
+class DrilledGround:
     """Constants of a ground, deg and m; ``scale`` is of every curvature."""
 
     collar_deg: float = 0.2  # of the direction at the collar against the design
@@ -38,19 +38,19 @@ class Ground:
     scale: float = 1.0
 
 
-Bend = Callable[[np.random.Generator, Ground, Array], Array]
+Bend = Callable[[np.random.Generator, DrilledGround, Array], Array]
 
 
-def _straight(_random: np.random.Generator, _ground: Ground, places: Array) -> Array:
+def _straight(_random: np.random.Generator, _ground: DrilledGround, places: Array) -> Array:
     return np.zeros((len(places), 2))
 
 
-def _constant_build(random: np.random.Generator, ground: Ground, places: Array) -> Array:
+def _constant_build(random: np.random.Generator, ground: DrilledGround, places: Array) -> Array:
     """Bent evenly in one direction."""
     return np.broadcast_to(ground.build_deg * random.normal() * _direction(random), (len(places), 2))
 
 
-def _walk_to_the_right(random: np.random.Generator, ground: Ground, places: Array) -> Array:
+def _walk_to_the_right(random: np.random.Generator, ground: DrilledGround, places: Array) -> Array:
     """Bent to the right of a build that is a third as large."""
     ahead = _direction(random)
     right = np.array([-ahead[1], ahead[0]])
@@ -58,13 +58,13 @@ def _walk_to_the_right(random: np.random.Generator, ground: Ground, places: Arra
     return np.broadcast_to(ground.walk_deg * walk, (len(places), 2))
 
 
-def _soft_layer(random: np.random.Generator, ground: Ground, places: Array) -> Array:
+def _soft_layer(random: np.random.Generator, ground: DrilledGround, places: Array) -> Array:
     """Straight to a depth, and bent from there on."""
     begins = random.uniform(*ground.layer_m)
     return np.where(places[:, None] > begins, ground.bend_deg * random.normal(size=2), 0.0)
 
 
-def _wellbore_1(random: np.random.Generator, ground: Ground, places: Array) -> Array:
+def _wellbore_1(random: np.random.Generator, ground: DrilledGround, places: Array) -> Array:
     """The published bore of 20 m drawn out to the length of the hole, of another size and towards any direction."""
     record = wellbore_1()
     stretch = LENGTH / record.md[-1]
@@ -76,14 +76,14 @@ def _wellbore_1(random: np.random.Generator, ground: Ground, places: Array) -> A
     return np.asarray(math.exp(ground.shape * random.normal()) * np.degrees(turned) / STEP / stretch @ towards)
 
 
-def _wave(random: np.random.Generator, ground: Ground, places: Array) -> Array:
+def _wave(random: np.random.Generator, ground: DrilledGround, places: Array) -> Array:
     """Bent to one side and back again."""
     length, begins = random.uniform(*ground.wave_m), random.uniform(0.0, math.tau)
     size = ground.build_deg * random.normal() * _direction(random)
     return np.sin(math.tau * places / length + begins)[:, None] * size
 
 
-def _wanders(random: np.random.Generator, ground: Ground, places: Array) -> Array:
+def _wanders(random: np.random.Generator, ground: DrilledGround, places: Array) -> Array:
     """A curvature that changes at random and is never forgotten."""
     steps = random.normal(size=(len(places), 2)) * math.sqrt(places[1] - places[0])
     return np.asarray(ground.random_deg * np.cumsum(steps, axis=0))
@@ -117,7 +117,7 @@ class DrilledHole:
         return np.array([np.interp(LENGTH, along, column) for column in self.positions.T])
 
 
-def drill_hole(seed: int, number: int, ground: Ground) -> DrilledHole:
+def drill_hole(seed: int, number: int, ground: DrilledGround) -> DrilledHole:
     """Drill one hole of the kind that is its number's turn, by a stream of its own."""
     random = random_stream(seed, RandomStream.PATHS, number)
     kind = list(KINDS)[number % len(KINDS)]

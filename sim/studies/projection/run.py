@@ -1,8 +1,9 @@
 """Where holes end, foreseen from every depth: a thousand of seven kinds, scored against where they do end.
 
-Holes are drilled with constants other than those of the prior (`drilled_holes.Ground`), so the study judges what a rig
-meets that is not the one that the prior was stated for. The share of ends inside the cone of 95 % is to be 93 to 97 %
-from every depth, and the continuous ranked probability score below those of going straight on and of bending on as now.
+Holes are drilled with constants other than those of the prior (`drilled_holes.DrilledGround`), so the study judges what
+a rig meets that is not the one that the prior was stated for. The share of ends inside the cone of 95 % is to be 93 to
+97 % from every depth, and the continuous ranked probability score below those of going straight on and of bending on as
+now.
 """
 
 from __future__ import annotations
@@ -13,15 +14,15 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.studies.pool import Step, over_cores
-from sim.studies.projection.drilled_holes import KINDS, Ground, drill_hole
-from sim.studies.projection.foreseen_ends import LIMITS, SPACING, STATIONS, Foreseen, foresee_ends
+from sim.studies.projection.drilled_holes import KINDS, DrilledGround, drill_hole
+from sim.studies.projection.foreseen_ends import SPACING, STATIONS, Foreseen, foresee_ends
 
 Array = npt.NDArray[np.float64]
 HOLES_A_JOB = 25
 GROUNDS = {
-    "as judged": Ground(),
-    "half as crooked": Ground(scale=0.5),
-    "twice as crooked": Ground(scale=2.0),
+    "as judged": DrilledGround(),
+    "half as crooked": DrilledGround(scale=0.5),
+    "twice as crooked": DrilledGround(scale=2.0),
 }
 OTHERS_SHARE = 4  # of the holes, that each other ground has
 INSIDE = (93.0, 97.0)  # %, to be reached
@@ -123,17 +124,22 @@ def _inside_row(name: str, found: list[Foreseen]) -> dict[str, Any]:
 
 
 def _reliability_rows(found: list[Foreseen]) -> list[dict[str, Any]]:
-    """Chances of ending within a limit, in bins: what was stated, and how often it was so."""
-    stated = np.array([one.chances for one in found]).reshape(-1)
-    came = np.array([np.broadcast_to(one.within, (STATIONS, len(LIMITS))) for one in found]).reshape(-1)
-    places = np.minimum((stated * BINS).astype(int), BINS - 1)
+    """Chances of ending within a limit, in bins: what was stated, and how often it was so.
+
+    A hole is asked from every depth and for every limit; what of a bin it has is one share, so bins count holes.
+    """
     rows = []
     for place in range(BINS):
-        those = places == place
-        if those.any():
-            name = f"{100 * place // BINS} to {100 * (place + 1) // BINS} %"
+        low, high = place / BINS, (place + 1) / BINS
+        stated, came = [], []
+        for one in found:
+            those = (one.chances >= low) & ((one.chances < high) | (place == BINS - 1))
+            if those.any():
+                stated.append(float(one.chances[those].mean()))
+                came.append(float(np.broadcast_to(one.within, one.chances.shape)[those].mean()))
+        if stated:
             rows.append({
-                "case": name, "number": int(those.sum()), "stated_percent": 100.0 * float(stated[those].mean()),
-                "observed_percent": 100.0 * float(came[those].mean()),
+                "case": f"{100 * low:.0f} to {100 * high:.0f} %", "holes": len(stated),
+                "stated_percent": 100.0 * float(np.mean(stated)), "observed_percent": 100.0 * float(np.mean(came)),
             })  # fmt: skip
     return rows

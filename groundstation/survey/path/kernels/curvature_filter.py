@@ -28,7 +28,7 @@ NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
-def product(left: Matrix, right: Matrix) -> Matrix:
+def multiply_matrices(left: Matrix, right: Matrix) -> Matrix:
     """Product of two matrices."""
     a, b, c, d = left
     e, f, g, h = right
@@ -36,25 +36,25 @@ def product(left: Matrix, right: Matrix) -> Matrix:
 
 
 @kernel
-def transposed(matrix: Matrix) -> Matrix:
+def transpose_matrix(matrix: Matrix) -> Matrix:
     """The matrix with its columns as rows."""
     return matrix[0], matrix[2], matrix[1], matrix[3]
 
 
 @kernel
-def applied(matrix: Matrix, to: Pair) -> Pair:
+def apply_matrix(matrix: Matrix, to: Pair) -> Pair:
     """Matrix times a pair."""
     return matrix[0] * to[0] + matrix[1] * to[1], matrix[2] * to[0] + matrix[3] * to[1]
 
 
 @kernel
-def outer(left: Pair, right: Pair) -> Matrix:
+def outer_product(left: Pair, right: Pair) -> Matrix:
     """Left times the transposed of right."""
     return left[0] * right[0], left[0] * right[1], left[1] * right[0], left[1] * right[1]
 
 
 @kernel
-def added(to: Matrix, factor: float, matrix: Matrix) -> Matrix:
+def add_scaled(to: Matrix, factor: float, matrix: Matrix) -> Matrix:
     """Matrix plus a multiple of another."""
     a, b, c, d = to
     return a + factor * matrix[0], b + factor * matrix[1], c + factor * matrix[2], d + factor * matrix[3]
@@ -67,36 +67,38 @@ def with_variance(matrix: Matrix, var: float) -> Matrix:
 
 
 @kernel
-def foresee(state: State, bent: float, left: float, noise: Array) -> State:
+def foresee_state(state: State, bent: float, left: float, noise: Array) -> State:
     """State at the end of a leg: a curvature of 1 is ``bent`` in the direction there and ``left`` in the curvature."""
     (t1, t2), (k1, k2), a, b, c = state
-    both = added(added(b, 1.0, transposed(b)), bent, c)
-    a = with_variance(added(a, bent, both), noise[0])
-    crossed = added(b, bent, c)
+    both = add_scaled(add_scaled(b, 1.0, transpose_matrix(b)), bent, c)
+    a = with_variance(add_scaled(a, bent, both), noise[0])
+    crossed = add_scaled(b, bent, c)
     b = with_variance((left * crossed[0], left * crossed[1], left * crossed[2], left * crossed[3]), noise[1])
     c = with_variance((left * left * c[0], left * left * c[1], left * left * c[2], left * left * c[3]), noise[2])
     return (t1 + bent * k1, t2 + bent * k2), (left * k1, left * k2), a, b, c
 
 
 @kernel
-def likelihood(a: Matrix, cov: Array, off: Pair) -> tuple[float, Matrix]:
+def weigh_direction(a: Matrix, cov: Array, off: Pair) -> tuple[float, Matrix]:
     """Logarithm of how likely a direction is that is off by a pair, and the inverse of its foreseen covariance."""
     xx, xy, yy = a[0] + cov[0, 0], a[1] + cov[0, 1], a[3] + cov[1, 1]
     det = xx * yy - xy * xy
     inverse = (yy / det, -xy / det, -xy / det, xx / det)
-    weighed = applied(inverse, off)
+    weighed = apply_matrix(inverse, off)
     return -0.5 * (weighed[0] * off[0] + weighed[1] * off[1] + math.log(det)), inverse
 
 
 @kernel
-def corrected(state: State, cov: Array, angle: Array, jumps: Array, chances: Array, leg: float) -> tuple[float, State]:
+def correct_state(
+    state: State, cov: Array, angle: Array, jumps: Array, chances: Array, leg: float
+) -> tuple[float, State]:
     """Logarithm of how likely a direction is, and the state with it known, over all jumps in the leg before it."""
     direction, curvature, a, b, c = state
     off = angle[0] - direction[0], angle[1] - direction[1]
     top = -math.inf
     for j in range(len(jumps)):
         widened = with_variance(a, jumps[j] ** 2 * leg * leg / 3.0)
-        top = max(top, math.log(chances[j]) + likelihood(widened, cov, off)[0])
+        top = max(top, math.log(chances[j]) + weigh_direction(widened, cov, off)[0])
     # moments of the changes of direction and curvature, weighed by how well each way foresaw
     total, turned, bent = 0.0, (0.0, 0.0), (0.0, 0.0)
     sum_a, sum_b, sum_c = NOTHING, NOTHING, NOTHING
@@ -105,24 +107,30 @@ def corrected(state: State, cov: Array, angle: Array, jumps: Array, chances: Arr
         wa, wb, wc = (
             with_variance(a, var * leg * leg / 3.0), with_variance(b, 0.5 * var * leg), with_variance(c, var),
         )  # fmt: skip
-        likely, inverse = likelihood(wa, cov, off)
+        likely, inverse = weigh_direction(wa, cov, off)
         share = math.exp(math.log(chances[j]) + likely - top)
-        gain_t, gain_k = product(wa, inverse), product(transposed(wb), inverse)
-        dt, dk = applied(gain_t, off), applied(gain_k, off)
+        gain_t, gain_k = multiply_matrices(wa, inverse), multiply_matrices(transpose_matrix(wb), inverse)
+        dt, dk = apply_matrix(gain_t, off), apply_matrix(gain_k, off)
         total += share
         turned = turned[0] + share * dt[0], turned[1] + share * dt[1]
         bent = bent[0] + share * dk[0], bent[1] + share * dk[1]
-        sum_a = added(sum_a, share, added(added(wa, -1.0, product(gain_t, wa)), 1.0, outer(dt, dt)))
-        sum_b = added(sum_b, share, added(added(wb, -1.0, product(gain_t, wb)), 1.0, outer(dt, dk)))
-        sum_c = added(sum_c, share, added(added(wc, -1.0, product(gain_k, wb)), 1.0, outer(dk, dk)))
+        sum_a = add_scaled(
+            sum_a, share, add_scaled(add_scaled(wa, -1.0, multiply_matrices(gain_t, wa)), 1.0, outer_product(dt, dt))
+        )
+        sum_b = add_scaled(
+            sum_b, share, add_scaled(add_scaled(wb, -1.0, multiply_matrices(gain_t, wb)), 1.0, outer_product(dt, dk))
+        )
+        sum_c = add_scaled(
+            sum_c, share, add_scaled(add_scaled(wc, -1.0, multiply_matrices(gain_k, wb)), 1.0, outer_product(dk, dk))
+        )
     part = 1.0 / total
     dt, dk = (part * turned[0], part * turned[1]), (part * bent[0], part * bent[1])
     return top + math.log(total), (
         (direction[0] + dt[0], direction[1] + dt[1]),
         (curvature[0] + dk[0], curvature[1] + dk[1]),
-        added(added(NOTHING, part, sum_a), -1.0, outer(dt, dt)),
-        added(added(NOTHING, part, sum_b), -1.0, outer(dt, dk)),
-        added(added(NOTHING, part, sum_c), -1.0, outer(dk, dk)),
+        add_scaled(add_scaled(NOTHING, part, sum_a), -1.0, outer_product(dt, dt)),
+        add_scaled(add_scaled(NOTHING, part, sum_b), -1.0, outer_product(dt, dk)),
+        add_scaled(add_scaled(NOTHING, part, sum_c), -1.0, outer_product(dk, dk)),
     )
 
 
@@ -150,8 +158,8 @@ def follow_directions(
         state = (angles[0, 0], angles[0, 1]), (0.0, 0.0), known, NOTHING, bends
         weight = weights[g]
         for i in range(len(lengths)):
-            state = foresee(state, steps[i, g, 0], steps[i, g, 1], noises[i, g])
-            likely, state = corrected(state, covs[i + 1], angles[i + 1], jumps, chances[i], lengths[i])
+            state = foresee_state(state, steps[i, g, 0], steps[i, g, 1], noises[i, g])
+            likely, state = correct_state(state, covs[i + 1], angles[i + 1], jumps, chances[i], lengths[i])
             weight += likely
         weights[g] = weight
         direction, curvature, a, b, c = state

@@ -48,6 +48,10 @@ export interface Off {
   deviation_cm: number;
   /** standard deviation of it */
   sigma_cm: number;
+  /** it is within this of the deviation with 95 % */
+  half_width_cm: number;
+  /** chance that it is within the limit */
+  within_percent: number;
   /** tolerance there */
   limit_cm: number;
   /** of the tolerance; null where none is allowed */
@@ -58,16 +62,24 @@ export interface Off {
   wind: "N" | "NNE" | "NE" | "ENE" | "E" | "ESE" | "SE" | "SSE" | "S" | "SSW" | "SW" | "WSW" | "W" | "WNW" | "NW" | "NNW";
 }
 
-/** Where to steer to, and the last depth from which it helps. */
+/** Where to steer to, and the last depth from which that makes it sure that the hole ends within its limit. */
 export interface Steer {
   /** towards which to steer */
   azimuth_deg: number;
   /** the same as a word */
   wind: "N" | "NNE" | "NE" | "ENE" | "E" | "ESE" | "SE" | "SSE" | "S" | "SSW" | "SW" | "WSW" | "W" | "WNW" | "NW" | "NNW";
-  /** last depth from which a correction still helps */
-  before_md_m: number | null;
-  /** of drilling until there */
+  /** last depth from which a correction makes the end sure */
+  before_md_m: number;
+  /** of drilling until there; less than 0 once it has been passed */
   left_m: number | null;
+  /** whether it has been passed */
+  missed: boolean;
+  /** chance of ending within that a correction is to bring */
+  sure_percent: number;
+  /** chance that a correction from now on brings */
+  best_percent: number;
+  /** most by which the rig bends the hole back, as it was stated */
+  bend_deg_per_m: number;
 }
 
 /** on_target, watch, steer, out or dont_know, with its reasons; good for good_for_s after its arrival. */
@@ -400,6 +412,39 @@ export interface ColumnDeviation {
   level_percent: number;
 }
 
+/** Where the hole will be at one depth, if it goes on as it tends to. */
+export interface ConeRow {
+  /** measured depth */
+  md_m: number;
+  /** along the design axis */
+  along_m: number;
+  /** expected, from the design axis */
+  north_cm: number;
+  /** expected, from the design axis */
+  east_cm: number;
+  /** expected, from the design axis */
+  deviation_cm: number;
+  /** of the deviation: it is within this of what is expected with 95 % */
+  half_width_cm: number;
+  /** of the cone: the hole is within this of the place expected with 95 % */
+  radius_cm: number;
+  /** tolerance at this depth */
+  limit_cm: number;
+}
+
+/** What is known of where the hole ends, if nothing is steered and it goes on as its own directions say. */
+export interface ForeseenEnd {
+  /** chance that it ends within the limit */
+  within_percent: number;
+  /** of the deviation of the projection: 95 % */
+  half_width_cm: number;
+  /** standard deviation of the end that is of the surveys alone */
+  surveyed_sigma_cm: number;
+  /** curvature of the hole now, as expected; null at its end */
+  bend_deg_per_m: number | null;
+  cone: ConeRow[];
+}
+
 /** Which of two angles makes more of the uncertainty of the toe. */
 export interface DominantAngle {
   /** which matters more for the position of the toe */
@@ -410,12 +455,13 @@ export interface DominantAngle {
   by_azimuth_m: number;
 }
 
-/** Deviation from the design axis at every station, and projected to the target. */
+/** Deviation from the design axis at every station, and expected at the target; ahead says how sure that is. */
 export interface ColumnAnswer {
   design: DesignAxis;
   stations: ColumnDeviation[];
   worst: ColumnDeviation;
   projection: ColumnDeviation | null;
+  ahead: ForeseenEnd | null;
   dominant: DominantAngle | null;
 }
 
@@ -433,6 +479,8 @@ export interface HistoryMoment {
   limit_cm: number;
   /** of the tolerance */
   used_percent: number;
+  /** chance of ending within it; null before the end is foreseen */
+  within_percent: number | null;
 }
 
 /** What was known at the end of every stop, thinned. */
@@ -574,6 +622,8 @@ export interface ToleranceAlarmRow {
   deviation_cm: number;
   /** standard deviation of the deviation */
   sigma_cm: number;
+  /** it was within this of the deviation with 95 % */
+  half_width_cm: number;
   /** passed */
   threshold_cm: number;
   /** rig time */

@@ -1,8 +1,9 @@
-// The hole from above, north up: tolerance at the target, path, region of uncertainty, where it will end.
+// The hole from above, north up: tolerance at the target, path, region of uncertainty, where it will end with 95 %.
 
 import { shape } from "./dom.js";
 
 const REACH = 118; // of the drawing, from its middle to an edge
+const SHOWN_LIMITS = 1.6; // limits to which the circle of the end is shown whole
 const FURTHEST = 0.86; // part of it that is used
 const STEPS_CM = [1, 2, 5, 10, 20, 50, 100, 200, 500];
 
@@ -21,7 +22,10 @@ export function drawPlan(place, column, uncertainty) {
   const end = column.projection;
   const limit = (end ?? column.worst).limit_cm;
   const marks = end ? [...stations, end] : stations;
-  const reach = Math.max(limit, ...marks.map((m) => Math.hypot(m.north_cm, m.east_cm)), 1);
+  const cone = column.ahead?.cone ?? [];
+  const spread = cone.at(-1)?.radius_cm ?? column.ahead?.half_width_cm ?? 0;
+  const furthest = end ? Math.min(end.deviation_cm + spread, SHOWN_LIMITS * limit) : 0;
+  const reach = Math.max(limit, furthest, ...marks.map((m) => Math.hypot(m.north_cm, m.east_cm)), 1);
   const scale = (FURTHEST * REACH) / reach;
   const x = (m) => m.east_cm * scale;
   const y = (m) => -m.north_cm * scale;
@@ -36,10 +40,10 @@ export function drawPlan(place, column, uncertainty) {
   ];
   const ellipse = uncertainty?.stations.at(-1)?.plan_ellipse;
   if (last && ellipse) parts.push(region(x(last), y(last), ellipse, scale));
-  if (end) parts.push(...toe(x(last), y(last), x(end), y(end), 2 * end.sigma_cm * scale));
+  if (end) parts.push(...toe([last, ...cone].map((m) => `${x(m)},${y(m)}`), x(end), y(end), spread * scale));
   parts.push(...letters(limit, scale));
   const label = end
-    ? `Plan: ends ${end.deviation_cm.toFixed(1)} cm off at ${end.direction_deg.toFixed(0)} degrees, limit ${limit.toFixed(0)} cm`
+    ? `Plan: ends ${end.deviation_cm.toFixed(0)} \u00b1 ${(column.ahead?.half_width_cm ?? 0).toFixed(0)} cm off at ${end.direction_deg.toFixed(0)} degrees, limit ${limit.toFixed(0)} cm`
     : "Plan: nothing surveyed yet";
   const box = `${-REACH} ${-REACH} ${2 * REACH} ${2 * REACH}`;
   place.replaceChildren(shape("svg", { viewBox: box, role: "img", "aria-label": label }, ...parts));
@@ -52,10 +56,10 @@ function region(cx, cy, ellipse, scale) {
   return shape("ellipse", { cx, cy, rx, ry, transform: turn, class: "region" });
 }
 
-function toe(x0, y0, x, y, radius) {
+function toe(way, x, y, radius) {
   return [
-    shape("line", { x1: x0, y1: y0, x2: x, y2: y, class: "ahead" }),
-    shape("circle", { cx: x, cy: y, r: Math.max(radius, 1), class: "region" }),
+    shape("circle", { cx: x, cy: y, r: Math.max(radius, 1), class: "cone" }),
+    shape("polyline", { points: way.join(" "), class: "ahead" }),
     shape("path", { d: `M${x - 5},${y - 5}l10,10m0,-10l-10,10`, class: "toe" }),
   ];
 }

@@ -4,7 +4,7 @@ import { byId, shape } from "./dom.js";
 
 const REACH = 118; // of the drawing, from its middle to an edge
 const [TALL, WIDE] = [0.74, 0.34]; // parts of it that the length and the widest ring take
-const [RING, RINGS, REGIONS] = [48, 5, 12]; // points of a ring, how many rings and regions at most
+const [RING, RINGS, REGIONS, CIRCLES] = [48, 5, 12, 4]; // points of a ring; how many rings, regions, circles of the cone
 const RAD = Math.PI / 180;
 const TURN_PER_PX = 0.7; // degrees
 
@@ -44,8 +44,9 @@ export function drawSpace(place, column, uncertainty) {
     shape("polyline", { points: stations.map(at).join(" "), class: "path" }),
   ];
   if (last) parts.push(dot(at(last)));
-  if (end && last) parts.push(shape("polyline", { points: [at(last), at(end)].join(" "), class: "ahead" }));
-  if (end) parts.push(shape("polygon", { points: around((n, e) => seen(end.north_cm + 2 * end.sigma_cm * n, end.east_cm + 2 * end.sigma_cm * e, end.along_m)), class: "region" }));
+  const cone = column.ahead?.cone ?? [];
+  if (last && cone.length) parts.push(shape("polyline", { points: [last, ...cone].map(at).join(" "), class: "ahead" }));
+  parts.push(...spread(cone, CIRCLES).map((r) => shape("polygon", { points: around((n, e) => seen(r.north_cm + r.radius_cm * n, r.east_cm + r.radius_cm * e, r.along_m)), class: "cone" })));
   parts.push(...compass(seen, widest), ...words(length, (100 * across) / down));
   const label = `3-D: towards ${view.azimuth.toFixed(0)} degrees, ${view.elevation.toFixed(0)} degrees from above`;
   const box = `${-REACH} ${-REACH} ${2 * REACH} ${2 * REACH}`;

@@ -1,14 +1,16 @@
-// Deviation over depth: what is allowed at each depth, the hole with its uncertainty, and where it goes.
+// Deviation over depth: what is allowed at each depth, the hole with its uncertainty, and the cone of where it goes.
 
 import { shape } from "./dom.js";
 
 const [WIDTH, HEIGHT] = [260, 300];
 const [LEFT, RIGHT, TOP, LOW] = [34, 12, 22, 18]; // margins
+const SHOWN_LIMITS = 2.2; // widest limits to which a cone is shown
 const NAME = 50; // room for the name of the axis
 const TICKS = [1, 2, 5, 10, 20, 50, 100, 200];
 
 /** @typedef {import("./answers").ColumnAnswer} ColumnAnswer */
 /** @typedef {import("./answers").ColumnDeviation} ColumnDeviation */
+/** @typedef {import("./answers").ConeRow} ConeRow */
 
 /**
  * Draw into `place` the deviation at every station and at the target.
@@ -20,8 +22,12 @@ export function drawStrip(place, column, bit) {
   const end = column.projection;
   const rows = end ? [...column.stations, end] : column.stations;
   const deepest = Math.max(column.design.target_m, ...rows.map((r) => r.md_m), 1);
-  const widest = 1.08 * Math.max(...rows.map((r) => Math.max(r.limit_cm, r.deviation_cm + 2 * r.sigma_cm)), 1);
-  const x = (cm) => LEFT + (Math.max(cm, 0) / widest) * (WIDTH - LEFT - RIGHT);
+  const cone = column.ahead?.cone ?? [];
+  const allowed = Math.max(...rows.map((r) => r.limit_cm), 1);
+  const reached = Math.max(...column.stations.map((r) => r.deviation_cm + 2 * r.sigma_cm), ...cone.map((r) => r.deviation_cm));
+  const open = Math.max(0, ...cone.map((r) => r.deviation_cm + r.half_width_cm));
+  const widest = 1.08 * Math.max(allowed, reached, Math.min(open, SHOWN_LIMITS * allowed));
+  const x = (cm) => LEFT + (Math.min(Math.max(cm, 0), widest) / widest) * (WIDTH - LEFT - RIGHT);
   const y = (m) => TOP + (m / deepest) * (HEIGHT - TOP - LOW);
   const line = (points) => points.map(([cm, m]) => `${x(cm)},${y(m)}`).join(" ");
   const edge = (side) => column.stations.map((r) => [r.deviation_cm + side * 2 * r.sigma_cm, r.md_m]);
@@ -35,13 +41,27 @@ export function drawStrip(place, column, bit) {
     shape("polyline", { points: line(column.stations.map((r) => [r.deviation_cm, r.md_m])), class: "path" }),
     ...column.stations.slice(1).map((r) => shape("circle", { cx: x(r.deviation_cm), cy: y(r.md_m), r: 2.5, class: "dot" })),
   ];
-  if (end && last) parts.push(shape("polyline", { points: line([[last.deviation_cm, last.md_m], [end.deviation_cm, end.md_m]]), class: "ahead" }));
+  if (last && cone.length) parts.push(...coneOf(last, cone, line));
   if (end) parts.push(...fan(rows.at(-1), x, y));
   if (bit !== null && bit !== undefined) parts.push(...bitMark(y(bit)));
   const label = last
     ? `Deviation over depth: ${last.deviation_cm.toFixed(1)} cm of ${last.limit_cm.toFixed(1)} cm at ${last.md_m.toFixed(1)} m`
     : "Deviation over depth: nothing surveyed yet";
   place.replaceChildren(shape("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": label }, ...parts));
+}
+
+/**
+ * Where the hole will be with 95 %, and what is expected.
+ * @param {ColumnDeviation} last
+ * @param {ConeRow[]} cone
+ */
+function coneOf(last, cone, line) {
+  const start = [[last.deviation_cm, last.md_m]];
+  const side = (sign) => cone.map((r) => [r.deviation_cm + sign * r.half_width_cm, r.md_m]);
+  return [
+    shape("polygon", { points: line([...start, ...side(1), ...side(-1).reverse()]), class: "cone" }),
+    shape("polyline", { points: line([...start, ...side(0)]), class: "ahead" }),
+  ];
 }
 
 /** @param {ColumnDeviation} deep */
