@@ -16,7 +16,6 @@ import numpy.typing as npt
 from groundstation.errors import SurveyError
 
 Array = npt.NDArray[np.float64]
-OPPOSITE = 1e-9  # of 1 + cosine, below which two directions have no shortest turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,21 +39,13 @@ def develop_directions(tangents: Array, covs: Array) -> DevelopedDirections:
     SurveyError
         Where the hole turns back on itself from one station to the next.
     """
-    cosines = (tangents[:-1] * tangents[1:]).sum(axis=1)
-    if np.any(cosines < OPPOSITE - 1.0):
+    from groundstation.survey.path.kernels.frame_along import roll_out  # reading alone needs no compiler
+
+    count = len(tangents)
+    angles, across, axes = np.zeros((count, 2)), np.empty((count, 2, 2)), axes_across(tangents[0])
+    if not roll_out(tangents, covs, axes, angles, across):
         raise SurveyError("path: expected directions that do not turn back on themselves from station to station")
-    turned = np.cross(tangents[:-1], tangents[1:])
-    sines = np.linalg.norm(turned, axis=1)
-    angles = np.arctan2(sines, cosines)
-    toward = tangents[1:] - cosines[:, None] * tangents[:-1]  # of length sine, across the first of the two
-    steps = toward * np.where(sines > 0.0, angles / np.where(sines > 0.0, sines, 1.0), 1.0)[:, None]
-    axes = np.empty((len(tangents), 2, 3))
-    axes[0] = axes_across(tangents[0])
-    for k, (axis, cosine) in enumerate(zip(turned, cosines.tolist(), strict=True)):
-        axes[k + 1] = axes[k] @ shortest_turn(axis, cosine).T
-    changes = np.einsum("kij,kj->ki", axes[:-1], steps)
-    rolled = np.concatenate([np.zeros((1, 2)), np.cumsum(changes, axis=0)])
-    return DevelopedDirections(rolled, axes @ covs @ axes.transpose(0, 2, 1), axes[-1])
+    return DevelopedDirections(angles, across, axes)
 
 
 def axes_across(tangent: Array) -> Array:
