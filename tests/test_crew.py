@@ -224,6 +224,29 @@ def test_every_line_fits_the_screen() -> None:
         assert max(map(len, part.plain.splitlines())) <= screen_panels.WIDTH
 
 
+@pytest.mark.parametrize(
+    ("off", "half_width", "within", "shown"),
+    [
+        (22.0, 4.0, 99.4, " ends |    -x-     |P 99%"),
+        (38.0, 12.0, 88.0, " ends |      ----x->P 88%"),  # up to 50 of 45 cm
+        (70.0, 15.0, 0.3, " ends |            >P  0%"),
+        (2.0, 9.0, 100.0, " ends |x--         |P100%"),
+    ],
+)
+def test_the_end_is_shown_as_what_it_may_be(off: float, half_width: float, within: float, shown: str) -> None:
+    """Twelve cells are the limit: the interval of 95 %, the place expected in it, an arrow where it goes beyond."""
+    row = {"deviation_cm": off, "limit_cm": 45.0}
+    found = screen_panels.ending_row(row, {"half_width_cm": half_width, "within_percent": within})
+    assert found.plain.rstrip() == shown
+    assert len(found.plain) == screen_panels.STRIP_WIDTH
+
+
+def test_a_line_that_is_too_long_leaves_the_deadline_to_the_line_below() -> None:
+    line = "WATCH: ends 38 ± 12 cm (95 %) at 253 deg WSW; within 45 cm: 88 %; act before 14.0 m"
+    assert screen_panels.short_line(line) == "WATCH: ends 38 ± 12 cm (95 %) at 253 deg WSW; within 45 cm: 88 %"
+    assert screen_panels.short_line(line[:78]) == line[:78]
+
+
 def test_an_older_answer_does_not_replace_a_newer_one() -> None:
     found = picture(status={"revision": 7, "utc": "2026-01-01T00:00:02+00:00", "tubes": 2})
     found.on_answer("status", {"revision": 5, "utc": "2026-01-01T00:00:01+00:00", "tubes": 1}, 1.0)
