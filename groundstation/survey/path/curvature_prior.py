@@ -3,7 +3,8 @@
 How large the curvature is and over which length it is forgotten differ from hole to hole; a prior says how probable
 each size and length is. Between the two extremes lie the kinds of hole that crews know: one that goes straight (a size
 near zero), one that builds evenly (a length beyond that of the hole), one that wanders (a short length). A layer that
-bends the hole where it is met is a jump of the curvature, which may come in any metre.
+bends the hole where it is met is a jump of the curvature, which may come in any metre; a hole that has met none for
+long is less likely to meet one, and one that jumps often goes on so.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ class CurvaturePrior:
     weights: Array  # (a, b), probabilities that come to 1
     jumps: Array  # (j,) rad/m, standard deviations of a jump
     jump_shares: Array  # (j,), of all jumps
-    metres_a_jump: float  # m, in which one is met on average
+    jumps_expected: float  # within the metres below: a gamma distribution of the rate of jumps
+    jump_metres: float  # m
 
 
 def stated_prior() -> CurvaturePrior:
@@ -43,15 +45,21 @@ def stated_prior() -> CurvaturePrior:
     by_size = np.exp(-0.5 * np.log(sizes / math.radians(TYPICAL_DEG)) ** 2)
     by_size = (1.0 - STRAIGHT) * by_size / by_size.sum()
     by_size[0] += STRAIGHT
-    lengths, by_length = np.array([4.0, 12.0, 40.0, 400.0]), np.array([2.0, 2.0, 2.0, 3.0]) / 9.0
+    lengths, by_length = np.array([4.0, 12.0, 40.0, 400.0]), np.array([2.0, 3.0, 4.0, 7.0]) / 16.0
     return CurvaturePrior(
-        sizes, lengths, np.outer(by_size, by_length), np.radians([0.1, 0.3]), np.array([0.5, 0.5]), METRES_A_JUMP
+        sizes,
+        lengths,
+        np.outer(by_size, by_length),
+        np.radians([0.1, 0.3]),
+        np.array([0.5, 0.5]),
+        JUMPS_EXPECTED,
+        JUMP_METRES,
     )
 
 
 TYPICAL_DEG = 0.06  # deg/m, of the size of a curvature
 STRAIGHT = 0.15  # of all holes
-METRES_A_JUMP = 60.0  # m
+JUMPS_EXPECTED, JUMP_METRES = 0.6, 20.0  # jumps and m
 STATED: Final = stated_prior()
 
 

@@ -19,9 +19,9 @@ from groundstation.survey.path.developed_directions import develop_directions
 
 Array = npt.NDArray[np.float64]
 LOOKED_BACK = 64  # stations: those far above say nothing more of what is ahead
-LEAST_STD = math.radians(0.01)  # of a direction each way: a tube lies in its hole with play
+LEAST_STD = math.radians(0.003)  # of a direction each way, where it is stated better
 COLLAR_STD = math.radians(0.25)  # of that at the collar, where it is told better: a mast is set up by a level
-NONE_IN_LEG = 1e-300  # chance, that its logarithm is finite
+MOST_JUMPS = 6.0  # that are counted: a curvature that jumps in every leg wanders
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +36,15 @@ class CurvatureTendency:
     means: Array  # (a b, 4): direction (rad) and curvature (rad/m) on two axes
     blocks: Array  # (a b, 3, 2, 2): covariance of the direction, of it with the curvature, of the curvature
     axes: Array  # (2, 3), the two axes across the hole
+    last_leg: float  # m
+    looked: float  # m, from the first station that was looked at
+    jumped: float  # times, as it seems
+
+    def chance_of_jump(self, distance: float | Array) -> Array:
+        """Chance that the curvature jumps within a distance (m), by the rate that the hole itself shows."""
+        passed = self.prior.jump_metres + self.looked
+        met = self.prior.jumps_expected + min(self.jumped, MOST_JUMPS)
+        return np.asarray(-np.expm1(-met * np.log1p(distance / passed)))
 
     @property
     def size(self) -> float:
@@ -84,16 +93,20 @@ def _follow(legs: Array, angles: Array, covs: Array, prior: CurvaturePrior, axes
     steps, noises = leg_tables(legs, prior)
     with np.errstate(divide="ignore"):
         logs = np.log(prior.weights.ravel())
-    means, blocks = np.empty((count, 4)), np.empty((count, 3, 4))
-    chances = jump_chances(legs, prior)
-    jumps = np.concatenate([[0.0], prior.jumps])
-    follow_directions(angles, covs, steps, noises, chances, jumps, legs, sizes**2, logs, means, blocks)
+    means, blocks, counts = np.empty((count, 4)), np.empty((count, 3, 4)), np.empty(count)
+    jumps, shares = (np.concatenate([[0.0], of]) for of in (prior.jumps, prior.jump_shares))
+    follow_directions(
+        angles, covs, steps, noises, legs, jumps, shares, prior.jumps_expected, prior.jump_metres, sizes**2, logs,
+        counts, means, blocks,
+    )  # fmt: skip
     weights = np.exp(logs - logs.max())
+    weights /= weights.sum()
     means[:, :2] -= angles[-1]
     shape = prior.weights.shape
     return CurvatureTendency(
-        prior, (weights / weights.sum()).reshape(shape), means, blocks.reshape(count, 3, 2, 2), axes
-    )
+        prior, weights.reshape(shape), means, blocks.reshape(count, 3, 2, 2), axes, float(legs[-1]), float(legs.sum()),
+        float(weights @ counts),
+    )  # fmt: skip
 
 
 def leg_tables(legs: Array, prior: CurvaturePrior) -> tuple[Array, Array]:
@@ -105,9 +118,3 @@ def leg_tables(legs: Array, prior: CurvaturePrior) -> tuple[Array, Array]:
     steps = np.tile(steps, (1, len(prior.sizes), 1))
     sized = prior.sizes[None, :, None, None] ** 2 * noises[:, None]
     return steps[places], sized.reshape(len(lengths), -1, 3)[places]
-
-
-def jump_chances(legs: Array, prior: CurvaturePrior) -> Array:
-    """Chances (n, 1 + j) that the curvature does not jump in legs (n,), m, or by each of the jumps."""
-    jumped = -np.expm1(-legs / prior.metres_a_jump)[:, None] * prior.jump_shares
-    return np.maximum(np.concatenate([1.0 - jumped.sum(axis=1, keepdims=True), jumped], axis=1), NONE_IN_LEG)

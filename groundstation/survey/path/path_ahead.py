@@ -8,7 +8,6 @@ stated 0.6 % too large.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,8 +27,8 @@ class PathAhead:
     """A hole at its last station, and how well that is known.
 
     ``position_cov`` (2, 2), m^2, is of its position across the hole, ``shared_cov`` (2, 2) of its direction: what all
-    directions share. Position and direction are taken to err together, for the last station is in both: the larger of
-    the two possible answers.
+    directions share. What the last direction has of its own is in the position with half of the last leg; what is
+    shared is taken to err with all of the position: the larger of the two possible answers.
     """
 
     tendency: CurvatureTendency
@@ -43,17 +42,19 @@ class PathAhead:
         by_curvature, noise = _of_cells(tendency, distance, 0)
         bent = by_curvature[:, None, None]
         means = distance * tendency.means[:, :2] + by_curvature[:, None] * tendency.means[:, 2:]
-        here, turned = root_of(self.position_cov), root_of(distance**2 * (a + self.shared_cov))
-        both = here + turned
-        covs = both @ both + distance * bent * (b + b.transpose(0, 2, 1)) + bent**2 * c
+        covs = self._straight(distance, a) + distance * bent * (b + b.transpose(0, 2, 1)) + bent**2 * c
         return self._with_jumps(means, covs + noise[:, None, None] * np.eye(2), distance, 0)
 
     def measured(self, distance: float) -> Array:
         """Covariance (2, 2) of the offset that is of the surveys: that of the straight line ahead."""
         weights, (a, _, _) = self.tendency.weights.ravel(), self.tendency.blocks.transpose(1, 0, 2, 3)
         own = np.einsum("c,cij->ij", weights, a)
-        both = root_of(self.position_cov) + root_of(distance**2 * (own + self.shared_cov))
-        return np.asarray(both @ both)
+        return self._straight(distance, own)
+
+    def _straight(self, distance: float, own: Array) -> Array:
+        """Covariance (..., 2, 2) of the line ahead, of a direction with what it has of its own (..., 2, 2)."""
+        both = root_of(self.position_cov) + root_of(distance**2 * self.shared_cov)
+        return np.asarray(both @ both + distance * (distance + self.tendency.last_leg) * own)
 
     def directions(self, distance: float) -> NormalMixture:
         """Direction (rad) relative to the one measured at the last station, after a distance (m)."""
@@ -68,7 +69,7 @@ class PathAhead:
     def _with_jumps(self, means: Array, covs: Array, distance: float, place: int) -> NormalMixture:
         """Add what follows from a jump ahead to that without one: about all cells together, for it is wider by far."""
         prior, weights = self.tendency.prior, self.tendency.weights.ravel()
-        jumped = -math.expm1(-distance / prior.metres_a_jump)
+        jumped = float(self.tendency.chance_of_jump(distance))
         left = 0.5 * distance * (1.0 - PLACES)
         responses = curvature_response(left, ENDLESS)[:, place]
         whole = NormalMixture(weights, means, covs)

@@ -36,11 +36,14 @@ def path_between(lengths: Array, size: float, correlation_length: float, part: f
 
 
 def tendency_between(tendency: CurvatureTendency, lengths: Array, part: float = 1.0) -> Array:
-    """Return ``path_between`` with what is known of a hole: the mean over all sizes and lengths, jumps included."""
+    """Return ``path_between`` with what is known of a hole: the mean over all sizes and lengths.
+
+    Jumps are in it as often as the directions of the hole show them, for a jump in a surveyed leg is seen at its end.
+    """
     prior, found = tendency.prior, np.zeros(len(lengths))
     for length, weights in zip(prior.lengths.tolist(), tendency.weights.T, strict=True):
         found += float(weights @ prior.sizes**2) * path_between(lengths, 1.0, length, part)
-    jumped = float(prior.jump_shares @ prior.jumps**2) * -np.expm1(-lengths / prior.metres_a_jump)
+    jumped = float(prior.jump_shares @ prior.jumps**2) * np.minimum(tendency.jumped * lengths / tendency.looked, 1.0)
     return found + jumped * lengths**4 * _of_jump(part)
 
 

@@ -7,7 +7,7 @@ turned step by step, and positions are the integral of the direction. The consta
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,13 +27,14 @@ STEEPEST = math.radians(60.0)  # inclination of a design
 class DrilledGround:
     """Constants of a ground, deg and m; ``scale`` is of every curvature."""
 
-    collar_deg: float = 0.2  # of the direction at the collar against the design
+    collar_deg: float = 0.1  # of the direction at the collar against the design
     build_deg: float = 0.16  # deg/m, of a constant build
     walk_deg: float = 0.13  # deg/m, of a walk to the right
-    layer_m: tuple[float, float] = (4.0, 27.0)  # where a layer begins
+    layer_m: tuple[float, float] = (2.0, 30.0)  # where a layer begins
     bend_deg: float = 0.2  # deg/m, by which it bends
     random_deg: float = 0.05  # deg/m a root metre, by which a curvature changes
     wave_m: tuple[float, float] = (15.0, 60.0)  # length of a wave
+    stretch: tuple[float, float] = (1.6, 2.4)  # of the length of a recorded shape
     shape: float = 0.45  # of the logarithm of the size of a recorded shape
     scale: float = 1.0
 
@@ -65,9 +66,9 @@ def _soft_layer(random: np.random.Generator, ground: DrilledGround, places: Arra
 
 
 def _wellbore_1(random: np.random.Generator, ground: DrilledGround, places: Array) -> Array:
-    """The published bore of 20 m drawn out to the length of the hole, of another size and towards any direction."""
+    """The published bore of 20 m drawn out to the length of the hole or more, of another size, in any direction."""
     record = wellbore_1()
-    stretch = LENGTH / record.md[-1]
+    stretch = random.uniform(*ground.stretch)
     leans = record.inclination * np.stack([np.cos(record.azimuth), np.sin(record.azimuth)])
     ends = (places[:, None] + STEP * np.array([-0.5, 0.5])) / stretch
     turned = np.stack([np.diff(np.interp(ends, record.md, lean))[:, 0] for lean in leans], axis=1)
@@ -117,23 +118,37 @@ class DrilledHole:
         return np.array([np.interp(LENGTH, along, column) for column in self.positions.T])
 
 
-def drill_hole(seed: int, number: int, ground: DrilledGround) -> DrilledHole:
-    """Drill one hole of the kind that is its number's turn, by a stream of its own."""
-    random = random_stream(seed, RandomStream.PATHS, number)
-    kind = list(KINDS)[number % len(KINDS)]
-    inclination, azimuth = random.uniform(0.0, STEEPEST), random.uniform(0.0, math.tau)
+def drill_holes(seed: int, numbers: Sequence[int], ground: DrilledGround) -> list[DrilledHole]:
+    """Drill holes, each of the kind that is its number's turn, by a stream of its own."""
     md = np.arange(round((LENGTH + BEYOND) / STEP) + 1) * STEP
+    kinds = [list(KINDS)[number % len(KINDS)] for number in numbers]
+    drawn = [
+        _drawn(random_stream(seed, RandomStream.PATHS, n), kind, ground, md)
+        for n, kind in zip(numbers, kinds, strict=True)
+    ]
+    designs, offs, bends = zip(*drawn, strict=True)
+    frames = _turned(np.array([_frame_of(*design) for design in designs]), np.radians(offs))
+    turns = np.radians(np.array(bends) * STEP)
+    tangents = np.empty((len(drawn), len(md), 3))
+    tangents[:, 0] = frames[:, 2]
+    for k in range(1, len(md)):
+        frames = _turned(frames, turns[:, k - 1])
+        tangents[:, k] = frames[:, 2]
+    positions = np.zeros_like(tangents)
+    positions[:, 1:] = np.cumsum(0.5 * STEP * (tangents[:, :-1] + tangents[:, 1:]), axis=1)
+    return [
+        DrilledHole(kind, *design, md, *path)
+        for kind, design, *path in zip(kinds, designs, tangents, positions, strict=True)
+    ]
+
+
+def _drawn(
+    random: np.random.Generator, kind: str, ground: DrilledGround, md: Array
+) -> tuple[tuple[float, float], Array, Array]:
+    """Inclination and azimuth of a design (rad), what the collar is off it (deg), and the curvature (deg/m)."""
+    design = random.uniform(0.0, STEEPEST), random.uniform(0.0, math.tau)
     off = ground.collar_deg * random.normal(size=2)
-    bends = ground.scale * KINDS[kind](random, ground, md[:-1] + 0.5 * STEP)
-    frame = _turned(_frame_of(inclination, azimuth), np.radians(off))
-    tangents = np.empty((len(md), 3))
-    tangents[0] = frame[2]
-    for k, turn in enumerate(np.radians(bends * STEP), 1):
-        frame = _turned(frame, turn)
-        tangents[k] = frame[2]
-    legs = 0.5 * STEP * (tangents[:-1] + tangents[1:])
-    positions = np.concatenate([np.zeros((1, 3)), np.cumsum(legs, axis=0)])
-    return DrilledHole(kind, inclination, azimuth, md, tangents, positions)
+    return design, off, ground.scale * KINDS[kind](random, ground, md[:-1] + 0.5 * STEP)
 
 
 def _direction(random: np.random.Generator) -> Array:
@@ -148,12 +163,11 @@ def _frame_of(inclination: float, azimuth: float) -> Array:
     return np.array([[c * cos, c * sin, -s], [-sin, cos, 0.0], [s * cos, s * sin, c]])
 
 
-def _turned(frame: Array, turn: Array) -> Array:
-    """Frame (3, 3) after its direction has turned by angles (2,) towards its two axes, without turning about itself."""
-    angle = math.hypot(*turn.tolist())
-    if angle == 0.0:
-        return frame
-    towards = (turn / angle) @ frame[:2]
-    ahead = math.cos(angle) * frame[2] + math.sin(angle) * towards
-    moved = math.cos(angle) * towards - math.sin(angle) * frame[2]
-    return np.stack([*(axis + (axis @ towards) * (moved - towards) for axis in frame[:2]), ahead])
+def _turned(frames: Array, turns: Array) -> Array:
+    """Frames (n, 3, 3) after their directions have turned by angles (n, 2) towards their two axes."""
+    angles = np.hypot(*turns.T)[:, None]
+    units = turns / np.where(angles > 0.0, angles, 1.0)
+    towards, ahead = np.einsum("ni,nij->nj", units, frames[:, :2]), frames[:, 2]
+    moved = np.cos(angles) * towards - np.sin(angles) * ahead
+    axes = frames[:, :2] + units[:, :, None] * (moved - towards)[:, None]
+    return np.concatenate([axes, (np.cos(angles) * ahead + np.sin(angles) * towards)[:, None]], axis=1)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.studies.pool import Step, over_cores
-from sim.studies.projection.drilled_holes import KINDS, DrilledGround, drill_hole
+from sim.studies.projection.drilled_holes import KINDS, DrilledGround, drill_holes
 from sim.studies.projection.foreseen_ends import SPACING, STATIONS, Foreseen, foresee_ends
 
 Array = npt.NDArray[np.float64]
@@ -92,7 +92,8 @@ def _jobs(holes: int, seed: int) -> list[Job]:
 def _foresee(job: Job) -> list[Foreseen]:
     ground, seed, first, end = job
     numbers = range(first, end)
-    return [foresee_ends(drill_hole(seed, number, GROUNDS[ground]), seed, number) for number in numbers]
+    holes = drill_holes(seed, numbers, GROUNDS[ground])
+    return [foresee_ends(hole, seed, number) for hole, number in zip(holes, numbers, strict=True)]
 
 
 def _depth_row(found: list[Foreseen], k: int) -> dict[str, Any]:
@@ -126,20 +127,19 @@ def _inside_row(name: str, found: list[Foreseen]) -> dict[str, Any]:
 def _reliability_rows(found: list[Foreseen]) -> list[dict[str, Any]]:
     """Chances of ending within a limit, in bins: what was stated, and how often it was so.
 
-    A hole is asked from every depth and for every limit; what of a bin it has is one share, so bins count holes.
+    A hole is asked from every depth and for every limit, and what it answers is not independent: ``holes`` are those
+    that are behind a bin.
     """
+    stated = np.array([one.chances for one in found])
+    came = np.array([np.broadcast_to(one.within, one.chances.shape) for one in found])
+    places = np.minimum((stated * BINS).astype(int), BINS - 1)
     rows = []
     for place in range(BINS):
-        low, high = place / BINS, (place + 1) / BINS
-        stated, came = [], []
-        for one in found:
-            those = (one.chances >= low) & ((one.chances < high) | (place == BINS - 1))
-            if those.any():
-                stated.append(float(one.chances[those].mean()))
-                came.append(float(np.broadcast_to(one.within, one.chances.shape)[those].mean()))
-        if stated:
+        those = places == place
+        if those.any():
             rows.append({
-                "case": f"{100 * low:.0f} to {100 * high:.0f} %", "holes": len(stated),
-                "stated_percent": 100.0 * float(np.mean(stated)), "observed_percent": 100.0 * float(np.mean(came)),
+                "case": f"{100 * place // BINS} to {100 * (place + 1) // BINS} %",
+                "holes": int(those.any(axis=(1, 2)).sum()), "stated_percent": 100.0 * float(stated[those].mean()),
+                "observed_percent": 100.0 * float(came[those].mean()),
             })  # fmt: skip
     return rows

@@ -17,12 +17,13 @@ from groundstation.survey.path.path_ahead import PathAhead
 
 DEG = math.pi / 180.0
 FINE = 0.025  # m
-NEVER = 1e15  # m, in which one jump is met
+NEVER = (1e-9, 1e6)  # jumps that are expected, in so many m
+SURELY = 1e4  # jumps, of which a rate is known as well as if it were told
 
 
 def one_cell(size: float, length: float) -> CurvaturePrior:
     """A prior that knows size and length, without jumps."""
-    return CurvaturePrior(np.array([size]), np.array([length]), np.ones((1, 1)), np.zeros(1), np.ones(1), NEVER)
+    return CurvaturePrior(np.array([size]), np.array([length]), np.ones((1, 1)), np.zeros(1), np.ones(1), *NEVER)
 
 
 def brute_force(depths: np.ndarray, ahead: float, size: float, length: float) -> np.ndarray:
@@ -59,7 +60,7 @@ def test_it_is_the_conditional_normal_of_the_process(size: float, length: float)
     tangents = directions_of(angles)
     space = np.zeros((count, 3, 3))
     space[:, :2, :2] = covs
-    tendency = learn_curvature(depths, tangents, space, one_cell(size, length))
+    tendency = replace(learn_curvature(depths, tangents, space, one_cell(size, length)), last_leg=0.0)  # it lies known
 
     cov = brute_force(depths, ahead, size, length)
     noise = covs + np.eye(2) * np.array([COLLAR_STD**2] + [LEAST_STD**2] * (count - 1))[:, None, None]
@@ -90,7 +91,7 @@ def test_the_weights_are_prior_times_marginal_likelihood() -> None:
     angles = np.cumsum(0.15 * DEG * random.normal(size=(6, 2)), axis=0)
     sizes, lengths = np.array([0.02, 0.08, 0.3]) * DEG, np.array([4.0, 30.0])
     weights = random.dirichlet(np.ones(6)).reshape(3, 2)
-    prior = CurvaturePrior(sizes, lengths, weights, np.zeros(1), np.ones(1), NEVER)
+    prior = CurvaturePrior(sizes, lengths, weights, np.zeros(1), np.ones(1), *NEVER)
     found = learn_curvature(depths, directions_of(angles), np.zeros((6, 3, 3)), prior).weights
     expected = np.zeros((3, 2))
     for a, size in enumerate(sizes):
@@ -112,7 +113,9 @@ def test_a_jump_in_a_leg_has_its_moments() -> None:
     size = random.normal(size=count) * jump
     left = leg * random.uniform(size=count)
     turned, bent = size * left, size
-    prior = CurvaturePrior(np.array([1e-9]), np.array([400.0]), np.ones((1, 1)), np.array([jump]), np.ones(1), 1e-3)
+    prior = CurvaturePrior(
+        np.array([1e-9]), np.array([400.0]), np.ones((1, 1)), np.array([jump]), np.ones(1), SURELY, 10.0
+    )
     covs = np.zeros((2, 3, 3))
     covs[1] = 0.3 * DEG**2 * np.diag([1.0, 1.0, 0.0])  # read badly, so that the moments are those beforehand
     seen = 0.1 * DEG
@@ -199,7 +202,7 @@ def test_the_stated_prior_is_a_probability() -> None:
 def test_a_jump_ahead_is_foreseen_by_its_draws() -> None:
     """Of a straight hole in ground with one kind of layer: the spread ahead by draws of when it comes, and of none."""
     prior = CurvaturePrior(
-        np.array([1e-9]), np.array([400.0]), np.ones((1, 1)), np.array([0.2 * DEG]), np.ones(1), 25.0
+        np.array([1e-9]), np.array([400.0]), np.ones((1, 1)), np.array([0.2 * DEG]), np.ones(1), SURELY, SURELY * 25.0
     )
     tendency = learn_curvature(np.arange(9) * 2.0, directions_of(np.zeros((9, 2))), np.zeros((9, 3, 3)), prior)
     # what is known of the present is taken away

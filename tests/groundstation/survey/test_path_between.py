@@ -1,6 +1,7 @@
 """How far a hole is off the arc between two stations, against sums over a fine grid and against draws."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -49,8 +50,11 @@ def test_an_even_bend_is_the_arc() -> None:
 def test_of_a_hole_it_is_the_mean_over_what_is_probable_jumps_included() -> None:
     """By draws of wandering curvatures that jump once in a leg, with the directions at both ends known."""
     jump, size, length, leg, every = 0.3 * DEG, 0.05 * DEG, 6.0, 8.0, 20.0
-    prior = CurvaturePrior(np.array([size]), np.array([length]), np.ones((1, 1)), np.array([jump]), np.ones(1), every)
+    prior = CurvaturePrior(
+        np.array([size]), np.array([length]), np.ones((1, 1)), np.array([jump]), np.ones(1), 1.0, every
+    )
     tendency = learn_curvature(np.array([0.0, leg]), np.tile([0.0, 0.0, 1.0], (2, 1)), np.zeros((2, 3, 3)), prior)
+    tendency = replace(tendency, jumped=1.0 - math.exp(-leg / every), looked=leg)  # as often as it is drawn below
     random, count, steps = np.random.default_rng(11), 20_000, 160
     step = leg / steps
     places = (np.arange(steps) + 0.5) * step

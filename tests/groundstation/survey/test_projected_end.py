@@ -17,9 +17,9 @@ from groundstation.survey.well.trajectory import TrajectoryPoint
 
 DEG = math.pi / 180.0
 # a ground that all but goes straight, without layers: what is foreseen is the straight line
-STRAIGHT_ON = CurvaturePrior(np.array([1e-9]), np.array([400.0]), np.ones((1, 1)), np.zeros(1), np.ones(1), 1e15)
+STRAIGHT_ON = CurvaturePrior(np.array([1e-9]), np.array([400.0]), np.ones((1, 1)), np.zeros(1), np.ones(1), 1e-9, 1e6)
 CROOKED = CurvaturePrior(
-    np.array([0.1 * DEG]), np.array([15.0]), np.ones((1, 1)), np.array([0.2 * DEG]), np.ones(1), 60.0
+    np.array([0.1 * DEG]), np.array([15.0]), np.ones((1, 1)), np.array([0.2 * DEG]), np.ones(1), 1e4, 60.0e4
 )
 
 
@@ -74,8 +74,8 @@ def test_a_hole_in_ground_that_bends_nothing_ends_straight_ahead(
     assert found.ends.limit == pytest.approx(0.05 + 0.02 * 25.0)
 
 
-def test_position_and_direction_err_together_and_what_is_shared_is_in_it() -> None:
-    """3 mm of position and 2 mrad that all directions share, over 20 m: 43 mm on the axis that shares."""
+def test_what_all_directions_share_errs_with_the_position() -> None:
+    """3 mm of position and 2 mrad that all directions share, over 20 m: 43 mm on that axis."""
     found = foresee([0.0, 0.0, 10.0], direction_of(0.0, 0.0, 0.0, shared=2e-3), ColumnDesign(), cov=9e-6)
     own = found.foreseen.cov[0, 0] - 0.003**2
     assert math.sqrt(found.measured[1, 1]) == pytest.approx(0.043, rel=0.01)

@@ -6,8 +6,10 @@ jump once, somewhere: then
 
     A += J^2 h^2 / 3 I,    B += J^2 h / 2 I,    C += J^2 I,
 
-the moments of a jump of standard deviation J at a place that is anywhere in the leg h. What follows from jumping or not
-is weighed by the direction that is measured next, and taken together as one normal with the same two moments.
+the moments of a jump of standard deviation J at a place that is anywhere in the leg h. How often it jumps is learnt
+too: after n jumps in s metres the chance of none in the next h is ((b + s) / (b + s + h))^(a + n). What follows
+from jumping or not is weighed by the direction that is measured next, and taken together as one normal with the same
+two moments.
 Source: Kalman (1960) for a cell; Ackerson and Fu, IEEE Trans. Automat. Contr. 15 (1970) for the jumps. rad and m.
 """
 
@@ -90,17 +92,18 @@ def weigh_direction(a: Matrix, cov: Array, off: Pair) -> tuple[float, Matrix]:
 
 @kernel
 def correct_state(
-    state: State, cov: Array, angle: Array, jumps: Array, chances: Array, leg: float
-) -> tuple[float, State]:
-    """Logarithm of how likely a direction is, and the state with it known, over all jumps in the leg before it."""
+    state: State, cov: Array, angle: Array, jumps: Array, shares: Array, still: float, leg: float
+) -> tuple[float, float, State]:
+    """How likely a direction is (logarithm); with it known the chance of a jump in the leg before it, and the state."""
     direction, curvature, a, b, c = state
     off = angle[0] - direction[0], angle[1] - direction[1]
     top = -math.inf
     for j in range(len(jumps)):
         widened = with_variance(a, jumps[j] ** 2 * leg * leg / 3.0)
-        top = max(top, math.log(chances[j]) + weigh_direction(widened, cov, off)[0])
+        chance = still if j == 0 else (1.0 - still) * shares[j]
+        top = max(top, math.log(chance) + weigh_direction(widened, cov, off)[0])
     # moments of the changes of direction and curvature, weighed by how well each way foresaw
-    total, turned, bent = 0.0, (0.0, 0.0), (0.0, 0.0)
+    total, kept, turned, bent = 0.0, 0.0, (0.0, 0.0), (0.0, 0.0)
     sum_a, sum_b, sum_c = NOTHING, NOTHING, NOTHING
     for j in range(len(jumps)):
         var = jumps[j] ** 2
@@ -108,7 +111,9 @@ def correct_state(
             with_variance(a, var * leg * leg / 3.0), with_variance(b, 0.5 * var * leg), with_variance(c, var),
         )  # fmt: skip
         likely, inverse = weigh_direction(wa, cov, off)
-        share = math.exp(math.log(chances[j]) + likely - top)
+        chance = still if j == 0 else (1.0 - still) * shares[j]
+        share = math.exp(math.log(chance) + likely - top)
+        kept = share if j == 0 else kept
         gain_t, gain_k = multiply_matrices(wa, inverse), multiply_matrices(transpose_matrix(wb), inverse)
         dt, dk = apply_matrix(gain_t, off), apply_matrix(gain_k, off)
         total += share
@@ -125,19 +130,23 @@ def correct_state(
         )
     part = 1.0 / total
     dt, dk = (part * turned[0], part * turned[1]), (part * bent[0], part * bent[1])
-    return top + math.log(total), (
-        (direction[0] + dt[0], direction[1] + dt[1]),
-        (curvature[0] + dk[0], curvature[1] + dk[1]),
-        add_scaled(add_scaled(NOTHING, part, sum_a), -1.0, outer_product(dt, dt)),
-        add_scaled(add_scaled(NOTHING, part, sum_b), -1.0, outer_product(dt, dk)),
-        add_scaled(add_scaled(NOTHING, part, sum_c), -1.0, outer_product(dk, dk)),
+    return (
+        top + math.log(total),
+        1.0 - part * kept,
+        (
+            (direction[0] + dt[0], direction[1] + dt[1]),
+            (curvature[0] + dk[0], curvature[1] + dk[1]),
+            add_scaled(add_scaled(NOTHING, part, sum_a), -1.0, outer_product(dt, dt)),
+            add_scaled(add_scaled(NOTHING, part, sum_b), -1.0, outer_product(dt, dk)),
+            add_scaled(add_scaled(NOTHING, part, sum_c), -1.0, outer_product(dk, dk)),
+        ),
     )
 
 
 @kernel
 def follow_directions(
-    angles: Array, covs: Array, steps: Array, noises: Array, chances: Array, jumps: Array, lengths: Array,
-    variances: Array, weights: Array, means: Array, blocks: Array,
+    angles: Array, covs: Array, steps: Array, noises: Array, lengths: Array, jumps: Array, shares: Array,
+    expected: float, within: float, variances: Array, weights: Array, counts: Array, means: Array, blocks: Array,
 ) -> None:  # fmt: skip
     """Weigh each cell by the directions of a hole, and leave what it makes of the last.
 
@@ -146,22 +155,24 @@ def follow_directions(
     angles, covs : (n, 2) rad and (n, 2, 2), directions at the stations and their covariance
     steps, noises : (n - 1, g, 2) and (n - 1, g, 3), of each leg in each cell: what of a curvature is in the direction
         and in the curvature at its end; variance of the direction, covariance, variance of the curvature
-    chances, jumps : (n - 1, j) and (j,) rad/m, chance that the curvature jumps in a leg, and by what (0: it does not)
     lengths : (n - 1,) m, of the legs
+    jumps, shares : (1 + j,) rad/m and (1 + j,), of a jump: size, and part of all jumps; the first one is none
+    expected, within : jumps that are expected beforehand within so many metres: a gamma distribution of their rate
     variances : (g,) rad^2/m^2, of the curvature at the first station in each cell
-    weights : (g,) logarithms, of the cells beforehand; set
+    weights, counts : (g,) logarithms, of the cells beforehand, set; (g,) set: how many jumps there seem to have been
     means, blocks : (g, 4) and (g, 3, 4), set: state at the last station; its covariance A, B, C
     """
     for g in range(len(weights)):
         known = covs[0, 0, 0], covs[0, 0, 1], covs[0, 1, 0], covs[0, 1, 1]
         bends = variances[g], 0.0, 0.0, variances[g]
         state = (angles[0, 0], angles[0, 1]), (0.0, 0.0), known, NOTHING, bends
-        weight = weights[g]
+        weight, count, passed = weights[g], 0.0, within
         for i in range(len(lengths)):
             state = foresee_state(state, steps[i, g, 0], steps[i, g, 1], noises[i, g])
-            likely, state = correct_state(state, covs[i + 1], angles[i + 1], jumps, chances[i], lengths[i])
-            weight += likely
-        weights[g] = weight
+            still = (passed / (passed + lengths[i])) ** (expected + count)
+            likely, jumped, state = correct_state(state, covs[i + 1], angles[i + 1], jumps, shares, still, lengths[i])
+            weight, count, passed = weight + likely, count + jumped, passed + lengths[i]
+        weights[g], counts[g] = weight, count
         direction, curvature, a, b, c = state
         means[g, 0], means[g, 1], means[g, 2], means[g, 3] = direction[0], direction[1], curvature[0], curvature[1]
         for place in range(4):
@@ -170,7 +181,8 @@ def follow_directions(
 
 def warm_up() -> None:
     """Compile the loop or load it from the cache."""
+    one = np.ones(1)
     follow_directions(
-        np.zeros((2, 2)), np.broadcast_to(np.eye(2), (2, 2, 2)).copy(), np.ones((1, 1, 2)), np.ones((1, 1, 3)),
-        np.ones((1, 1)), np.zeros(1), np.ones(1), np.ones(1), np.zeros(1), np.zeros((1, 4)), np.zeros((1, 3, 4)),
+        np.zeros((2, 2)), np.broadcast_to(np.eye(2), (2, 2, 2)).copy(), np.ones((1, 1, 2)), np.ones((1, 1, 3)), one,
+        one, one, 1.0, 1.0, one, one.copy(), one.copy(), np.zeros((1, 4)), np.zeros((1, 3, 4)),
     )  # fmt: skip

@@ -24,7 +24,7 @@ SAME, ROUNDISH = 1e-9, 3.0  # of two standard deviations, up to which they are o
 STEEP, MOST_PANELS = 6.0, 40  # standard deviations by which the chord may change in one panel of nodes; panels
 ROOT_TWO, ROOT_TWO_PI = math.sqrt(2.0), math.sqrt(2.0 * math.pi)
 LEAST = 1e-12  # m, of a standard deviation
-CLOSE = 1e-9  # of a chance that is looked for
+CLOSE = 1e-8  # of a chance that is looked for
 TRIES = 60  # of that
 
 
