@@ -72,7 +72,7 @@ def test_every_type_has_only_fields_that_its_key_promises(shape: type, answer: F
 
 def test_answers_have_their_types(ground: Ground) -> None:
     verdict = ground.verdict()
-    assert verdict.by_surveys == "steer"
+    assert verdict.by_surveys == "out"  # bent by 1 deg/m over the last leg: no correction is likely to bring it back
     assert (type(verdict), type(verdict.off), type(ground.alarms()[0])) == (AnsweredVerdict, Off, Alarm)
     assert verdict.utc.endswith("+00:00")
     assert verdict.off is not None
@@ -111,7 +111,9 @@ def test_another_rig_is_told_which_live(served: Served) -> None:
 
 
 def test_an_answer_of_an_older_ground_station_is_named() -> None:
-    with pytest.raises(AnswerError, match="Steer: the answer lacks wind, before_md_m, left_m"):
+    with pytest.raises(
+        AnswerError, match="Steer: the answer lacks wind, before_md_m, left_m, missed, sure_percent, best_percent"
+    ):
         shape_answer(Steer, {"azimuth_deg": 1.0})
 
 

@@ -89,14 +89,14 @@ async def test_from_the_alarm_to_the_right_answers_with_one_key(served: Served) 
             await asyncio.to_thread(served.do, drift)
             # each part of the screen is an answer of its own, and those of the way to this depth come first
             header = "HOLE rig-1 * live 0.0s  MD 10.0/20.0 m  tubes 5  health good  alarms 1"
-            told = "STEER: ends 43.1 ± 0.1 cm at 0 deg N; limit 45 (96 %); act before 13.1 m"
-            row = ">  1 raised projection 20.0 m 0 deg N: 43.1 ± 0.1 cm over 80 % of 45 cm"
+            told = "STEER: ends 73 ± 19 cm (95 %) at 0 deg N; within 45 cm: < 1 %"  # its deadline stands below
+            row = ">  1 raised projection 20.0 m 0 deg N: 80 ± 43 cm (95 %) over 100 % of 45 cm"
             text = await until(app, served, lambda text: all(part in text for part in (header, told, row)), speaks)
             lines = text.splitlines()
             assert len(lines) <= SIZE[1]
             assert lines[0].rstrip() == header
             assert lines[1].strip() == told
-            assert lines[2].strip() == "steer to 180 deg S before 13.1 m, 3.1 m are left"
+            assert lines[2].strip() == "steer to 180 deg S before 10.1 m, 0.1 m are left"
             await pilot.press("a")
             text = await until(
                 app, served, lambda text: "acknowledge alarm 1: done" in text and "1 ack anna proj" in text, speaks

@@ -217,6 +217,11 @@ def test_a_chance_is_never_told_as_certain(of: float, text: str) -> None:
     assert chance_text(of) == text
 
 
+def test_a_depth_above_the_collar_is_told_as_none() -> None:
+    found = judge_hole(known(9.0, bit=4.0, std=0.1))
+    assert found.why == ("within 45 cm: < 1 %; 95 % was never to be had, now < 1 % at best",)
+
+
 @given(azimuth_deg=st.floats(-720.0, 720.0))
 def test_the_word_of_a_direction_is_within_its_wind(azimuth_deg: float) -> None:
     centre = 22.5 * WINDS.index(compass_point(math.radians(azimuth_deg)))

@@ -54,7 +54,9 @@ def test_a_hole_from_its_first_tube_to_steer_and_what_the_crew_does(tmp_path: Pa
         expect(page.locator("#verdict")).to_have_class("on_target")
         expect(page.locator("#todo")).to_have_text("go on")
         expect(page.locator("#alarm-list li")).to_have_count(0)
-        expect(page.locator("#plan svg")).to_have_attribute("aria-label", re.compile("ends 9.9 cm off at 0 degrees"))
+        expect(page.locator("#plan svg")).to_have_attribute(
+            "aria-label", re.compile("ends 10 ± 14 cm off at 0 degrees")
+        )
         for stop, inclination_deg in enumerate(LEANING, 4):
             drill(rig, stop, inclination_deg)
         # what was known earlier, and back to now
@@ -64,18 +66,18 @@ def test_a_hole_from_its_first_tube_to_steer_and_what_the_crew_does(tmp_path: Pa
         page.keyboard.press("ArrowRight")
         page.keyboard.press("ArrowRight")
         expect(page.locator("#then")).to_contain_text("6.0 m: 22 % of the tolerance; the verdict is of now")
-        expect(page.locator("#plan svg")).to_have_attribute("aria-label", re.compile("ends 9.9 cm off"))
+        expect(page.locator("#plan svg")).to_have_attribute("aria-label", re.compile("ends 10 ± 14 cm off"))
         page.click("#live")
-        expect(page.locator("#plan svg")).to_have_attribute("aria-label", re.compile("ends 43.1 cm off"))
+        expect(page.locator("#plan svg")).to_have_attribute("aria-label", re.compile("ends 73 ± 19 cm off"))
         # the task: which hole, how far off, how deep, which way, what to do, until when; read from what is shown
         expect(page.locator("#word")).to_have_text("STEER")
         expect(page.locator("#hole")).to_have_text("rig-1")
         expect(page.locator("#facts")).to_contain_text("MD 10.0/20.0 m · tubes 5 · health good · alarms 1")
-        told = "ends 43.1 ± 0.1 cm at 0 deg N; limit 45 (96 %); act before 13.1 m"
+        told = "ends 73 ± 19 cm (95 %) at 0 deg N; within 45 cm: < 1 %; act before 10.1 m"
         expect(page.locator("#told")).to_have_text(told)
-        expect(page.locator("#todo")).to_have_text("steer to 180 deg S before 13.1 m, 3.1 m are left")
+        expect(page.locator("#todo")).to_have_text("steer to 180 deg S before 10.1 m, 0.1 m are left")
         alarm = page.locator("#alarm-list li", has_text="projection")
-        expect(alarm.locator(".what")).to_contain_text("1 projection at 20.0 m at 0° N: 43.1 ± 0.1 cm")
+        expect(alarm.locator(".what")).to_contain_text("1 projection at 20.0 m at 0° N: 80 ± 43 cm (95 %)")
         # one action, which asks for the role once
         alarm.locator("text=Acknowledge").click()
         sign_in(page, "not the password")

@@ -156,7 +156,7 @@ def _word_of(end: ProjectedEnd, deadline: Deadline | None, stop: float) -> tuple
     if deadline is None:
         return Word.WATCH if end.within >= EVEN else Word.OUT, f"it is at its depth; {within}"
     if deadline.is_missed:
-        missed = f"{100.0 * SURE:.0f} % was to be had until {deadline.before:.1f} m"
+        missed = missed_text(SURE, deadline.before)
         word = Word.STEER if deadline.best >= EVEN else Word.OUT
         return word, f"{within}; {missed}, now {chance_text(deadline.best)} at best"
     if end.within < EVEN <= end.centred:
@@ -178,6 +178,11 @@ def correction_deadline(end: ProjectedEnd, known: Known) -> Deadline:
         return Deadline(before, None, end.chance_within(end.limit))
     moved = 0.5 * known.curvature * max(known.target - known.bit, 0.0) ** 2
     return Deadline(before, before - known.bit, end.chance_within(end.limit + moved))
+
+
+def missed_text(sure: float, before: float) -> str:
+    """That a depth (m) for a chance has been passed; or that none was deep enough to begin at."""
+    return f"{100.0 * sure:.0f} % " + (f"was to be had until {before:.1f} m" if before > 0.0 else "was never to be had")
 
 
 def chance_text(chance: float) -> str:

@@ -17,6 +17,7 @@ from groundstation.service.alarms.verdict import (
     compass_point,
     deviation_azimuth,
     judge_hole,
+    missed_text,
 )
 from groundstation.service.alarms.verdict_doubts import known_of
 from groundstation.service.answers.answer_views import view_of
@@ -138,7 +139,7 @@ def correction_line(word: Word, way: Steer) -> str:
     verb = "steer" if word is Word.STEER else "go on; if it stays so, steer"
     where = f"{verb} to {way.azimuth_deg:g} deg {way.wind}"
     if way.missed:
-        sure = f"{way.sure_percent:g} % was to be had until {way.before_md_m:.1f} m"
-        return f"{where} at once: {sure}, now {chance_text(0.01 * way.best_percent)} at best"
+        missed = missed_text(0.01 * way.sure_percent, way.before_md_m)
+        return f"{where} at once: {missed}, now {chance_text(0.01 * way.best_percent)} at best"
     left = "" if way.left_m is None else f", {way.left_m:.1f} m are left"
     return f"{where} before {way.before_md_m:.1f} m{left}"
