@@ -62,4 +62,4 @@ def shortest_turn(turned: Array, cosine: float) -> Array:
     """Rotation (3, 3) by the shortest way, of the cross product (3,) of two unit vectors and their cosine."""
     x, y, z = turned.tolist()
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + skew + skew @ skew / (1.0 + cosine)
+    return np.asarray(np.eye(3) + skew + skew @ skew / (1.0 + cosine))

@@ -120,7 +120,7 @@ class DrilledHole:
 
 def drill_holes(seed: int, numbers: Sequence[int], ground: DrilledGround) -> list[DrilledHole]:
     """Drill holes, each of the kind that is its number's turn, by a stream of its own."""
-    md = np.arange(round((LENGTH + BEYOND) / STEP) + 1) * STEP
+    md = STEP * np.arange(float(round((LENGTH + BEYOND) / STEP) + 1))
     kinds = [list(KINDS)[number % len(KINDS)] for number in numbers]
     drawn = [
         _drawn(random_stream(seed, RandomStream.PATHS, n), kind, ground, md)
@@ -137,8 +137,8 @@ def drill_holes(seed: int, numbers: Sequence[int], ground: DrilledGround) -> lis
     positions = np.zeros_like(tangents)
     positions[:, 1:] = np.cumsum(0.5 * STEP * (tangents[:, :-1] + tangents[:, 1:]), axis=1)
     return [
-        DrilledHole(kind, *design, md, *path)
-        for kind, design, *path in zip(kinds, designs, tangents, positions, strict=True)
+        DrilledHole(kind, inclination, azimuth, md, directions, places)
+        for kind, (inclination, azimuth), directions, places in zip(kinds, designs, tangents, positions, strict=True)
     ]
 
 

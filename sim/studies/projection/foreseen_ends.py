@@ -54,8 +54,9 @@ def foresee_ends(hole: DrilledHole, seed: int, number: int) -> Foreseen:
     trajectory.extend([(SPACING * (k + 1), direction) for k, direction in enumerate(measured)])
     end = design.across @ hole.end(design.axis)
     found = [_from_station(trajectory, k, measured[k - 1], design, end) for k in range(1, STATIONS + 1)]
-    columns = [np.array(column) for column in zip(*found, strict=True)]
-    return Foreseen(*columns, np.hypot(*end) <= np.array(LIMITS))
+    inside, radius, off, score, straight, constant, reached, chances = map(np.array, zip(*found, strict=True))
+    within = np.hypot(*end) <= np.array(LIMITS)
+    return Foreseen(inside, radius, off, score, straight, constant, reached, chances, within)
 
 
 def survey_hole(hole: DrilledHole, seed: int, number: int) -> list[Direction]:
