@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, 
 from groundstation.survey.well.compiled_model import locate_stations
 from groundstation.survey.well.error_propagation import Uncertainty
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
+from groundstation.survey.well.leg_errors import covariance_at
 from groundstation.survey.well.methods import Method, dogleg_severity, horizontal_closure, vertical_section
 from groundstation.survey.well.reference_frames import SAME_DEPTH, Norths, ReferenceFrame, TieOn
 from groundstation.survey.well.well_record import SurveyRecord
@@ -28,6 +29,11 @@ RECORD_COLUMNS = {
     "measurements": ("Readings", 1.0),
     "time_s": ("Time", 1.0),
 }
+
+
+def record_variables(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Further columns of a record as variables of formulas, SI and rad; without those that are none."""
+    return {name: columns[c] * factor for c, (name, factor) in RECORD_COLUMNS.items() if c in columns}
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +51,8 @@ class Region:
         return turned + self.tie_cov if self.tie_cov.any() else turned
 
     def at(self, md: float) -> Array:
-        """Covariance (3, 3) at any depth of the survey; errors as ``Uncertainty.at``."""
-        return self._turned(self.model.at(md)) + self.tie_cov
+        """Covariance (3, 3) at any depth of the survey; errors as ``covariance_at``."""
+        return self._turned(covariance_at(self.model, md)) + self.tie_cov
 
     def by_source(self) -> dict[str, Array]:
         """Covariance (n, 3, 3) by the name of its source; ``tie-on`` is what was there before."""
@@ -84,7 +90,7 @@ class Analysis:
         return self.frame.depths.to_answer(self.record.md)
 
     def covariance_at(self, md: float) -> Array:
-        """Covariance (3, 3, m^2) at any depth of the answer; errors as ``Uncertainty.at``."""
+        """Covariance (3, 3, m^2) at any depth of the answer; errors as ``Region.at``."""
         return self.uncertainty.at(self.frame.depths.to_record(md))
 
 
@@ -140,8 +146,7 @@ def analyse_survey(
     start = np.array([0.0, 0.0, height if at_zero else 0.0])
     if tie_on is not None:
         start = _turn(-frame.norths.of(frame.record)) @ tie_on.position
-    extra = {name: record.columns[c] * f for c, (name, f) in RECORD_COLUMNS.items() if c in record.columns}
-    survey = WellSurvey(record.md, record.inclination, azimuth, record.md, extra)
+    survey = WellSurvey(record.md, record.inclination, azimuth, record.md, record_variables(record.columns))
     legs = [Leg(tool)] if isinstance(tool, SurveyTool) else legs_of(tool, record.md)
     allowance = tie_on is None and legs[0].tool.slot_allowance
     places, found = locate_stations(method, survey, legs, site, start, slot_allowance=allowance)
