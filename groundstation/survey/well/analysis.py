@@ -17,7 +17,7 @@ from groundstation.survey.well.error_propagation import Uncertainty
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
 from groundstation.survey.well.leg_errors import covariance_at
 from groundstation.survey.well.methods import Method, dogleg_severity, horizontal_closure, vertical_section
-from groundstation.survey.well.reference_frames import SAME_DEPTH, Norths, ReferenceFrame, TieOn
+from groundstation.survey.well.reference_frames import SAME_DEPTH, ReferenceFrame, TieOn, turn_north
 from groundstation.survey.well.well_record import SurveyRecord
 
 Array = npt.NDArray[np.float64]
@@ -34,6 +34,11 @@ RECORD_COLUMNS = {
 def record_variables(columns: Mapping[str, Array]) -> dict[str, Array]:
     """Further columns of a record as variables of formulas, SI and rad; without those that are none."""
     return {name: columns[c] * factor for c, (name, factor) in RECORD_COLUMNS.items() if c in columns}
+
+
+def default_method(record: SurveyRecord) -> Method:
+    """Minimum curvature; of lateral displacements balanced tangential, with which their form was published."""
+    return Method.BALANCED_TANGENTIAL if record.of_displacements else Method.MINIMUM_CURVATURE
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +80,7 @@ class Analysis:
     """Positions (n, 3) with what follows from them, all in one frame; m and rad, north east down."""
 
     record: SurveyRecord
+    method: Method
     frame: ReferenceFrame
     azimuth: Array  # (n,) from the answer's north
     positions: Array
@@ -145,7 +151,7 @@ def analyse_survey(
     azimuth = frame.to_true(record.azimuth)
     start = np.array([0.0, 0.0, height if at_zero else 0.0])
     if tie_on is not None:
-        start = _turn(-frame.norths.of(frame.record)) @ tie_on.position
+        start = turn_north(-frame.norths.of(frame.record)) @ tie_on.position
     survey = WellSurvey(record.md, record.inclination, azimuth, record.md, record_variables(record.columns))
     legs = [Leg(tool)] if isinstance(tool, SurveyTool) else legs_of(tool, record.md)
     allowance = tie_on is None and legs[0].tool.slot_allowance
@@ -154,10 +160,11 @@ def analyse_survey(
     distance, direction = horizontal_closure(turned)
     tie_cov = np.zeros((3, 3))
     if tie_on is not None:
-        from_record = frame.turn @ _turn(-frame.norths.of(frame.record))
+        from_record = frame.turn @ turn_north(-frame.norths.of(frame.record))
         tie_cov = from_record @ tie_on.cov @ from_record.T
     return Analysis(
         record,
+        method,
         frame,
         frame.azimuth(azimuth),
         turned,
@@ -169,11 +176,6 @@ def analyse_survey(
     )
 
 
-def _turn(angle: float) -> Array:
-    """Matrix (3, 3) into axes whose north lies at ``angle`` (rad)."""
-    return ReferenceFrame(answer="site", norths=Norths(site=angle)).turn
-
-
 def _tied(record: SurveyRecord, tie_on: TieOn) -> SurveyRecord:
     """The record from its tie-on down; what else it holds there is that of its first station."""
     keep = slice(1, None) if record.md[0] <= tie_on.md + SAME_DEPTH else slice(None)
@@ -182,7 +184,7 @@ def _tied(record: SurveyRecord, tie_on: TieOn) -> SurveyRecord:
     columns = {name: np.concatenate([values[:1], values[keep]]) for name, values in record.columns.items()}
     if len(md) < 2:
         raise SurveyError(f"tie-on: expected a station below {tie_on.md:g} m, got none")
-    return SurveyRecord(md, inclination, azimuth, [0, *record.lines[keep]], columns)
+    return SurveyRecord(md, inclination, azimuth, [0, *record.lines[keep]], columns, record.of_displacements)
 
 
 def legs_of(parts: Sequence[Stretch], md: Array) -> list[Leg]:
