@@ -88,16 +88,17 @@ def check_reach(designs: Sequence[ColumnDesign], frame: Array, pairs: Pairs, ran
                 f"the design of joint {joint} has no depth in which it is to be tight: it begins at {top:g} m and ends "
                 f"at {bottom:g} m"
             )
-        for k in pair:
-            head, toe = float(ends[k, 0]), float(ends[k, 1])
-            where = f"joint {joint} is to be tight from {top:g} to {bottom:g} m"
-            if head > top + TOE:
-                raise SurveyError(
-                    f"{where}, yet by its design column {designs[k].name} begins at {head:g} m: it opens at the top; "
-                    f"expected a head at {top:g} m, or tight_from_m = {head:g}"
-                )
-            if toe < bottom - TOE:
-                raise SurveyError(
-                    f"{where}, yet by its design column {designs[k].name} ends at {toe:g} m; expected a toe at "
-                    f"{bottom:g} m, or tight_to_m = {toe:g}"
-                )
+        where = f"joint {joint} is to be tight from {top:g} to {bottom:g} m, yet by its design column"
+        low = max(pair, key=lambda k: ends[k, 0])
+        short = min(pair, key=lambda k: ends[k, 1])
+        head, toe = float(ends[low, 0]), float(ends[short, 1])
+        if head > top + TOE:
+            raise SurveyError(
+                f"{where} {designs[low].name} begins at {head:g} m: it opens at the top; expected a head at {top:g} m, "
+                f"or tight_from_m = {head:g}"
+            )
+        if toe < bottom - TOE:
+            raise SurveyError(
+                f"{where} {designs[short].name} ends at {toe:g} m; expected a toe at {bottom:g} m, "
+                f"or tight_to_m = {toe:g}"
+            )

@@ -151,7 +151,7 @@ def test_a_magnetic_survey_errs_alike_in_whichever_north_its_wall_is_told(tmp_pa
     np.testing.assert_allclose(regions[1], regions[0], rtol=1e-6, atol=1e-12)
     untold = read_wall(wall(tmp_path / "untold", "grid", "grid", ""))  # taken as if grid were magnetic north
     toes = [each.columns.covs[:, -2] for each in (untold, grid)]
-    assert float(np.max(np.abs(toes[0] - toes[1]))) > 0.01 * float(np.max(toes[1]))
+    assert float(np.max(np.abs(toes[0] - toes[1]))) > 1e-3 * float(np.max(toes[1]))
 
 
 def test_what_a_wall_proposes_stands_in_grid_coordinates(tmp_path: Path) -> None:
