@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import PropagationMode
-from groundstation.survey.well.arcs import Arcs
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
+from groundstation.survey.well.hole_arcs import HoleArcs
 from groundstation.survey.well.leg_errors import LegErrors, SourceKey, leg_errors
 from groundstation.survey.well.methods import check_stations, station_tangents
 from groundstation.survey.well.path_search import least_place, leg_of, sample_places
@@ -166,8 +166,8 @@ def _variance(errors: LegErrors, leg: npt.NDArray[np.intp], fraction: Array, uni
     return np.maximum(np.einsum("ki,kij,kj->k", unit, errors.covariance(leg, fraction), unit), 0.0)
 
 
-def _arcs(hole: ClearanceHole) -> Arcs:
-    return Arcs.of_stations(
+def _arcs(hole: ClearanceHole) -> HoleArcs:
+    return HoleArcs.of_stations(
         hole.survey.md, hole.positions, station_tangents(hole.survey.inclination, hole.survey.azimuth)
     )
 

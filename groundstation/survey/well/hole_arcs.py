@@ -25,7 +25,7 @@ AT_ONCE = 200_000  # points times arcs that are compared together
 
 
 @dataclass(frozen=True, slots=True)
-class Arcs:
+class HoleArcs:
     """Arcs between the stations of a hole (s,), each from its upper station on."""
 
     begin: Array  # (s, 3)
@@ -35,7 +35,7 @@ class Arcs:
     bend: Array  # rad
 
     @classmethod
-    def of_stations(cls, md: Array, positions: Array, tangents: Array) -> Arcs:
+    def of_stations(cls, md: Array, positions: Array, tangents: Array) -> HoleArcs:
         """Arcs of stations (n,) at positions (n, 3) with downhole unit vectors (n, 3)."""
         first, second = tangents[:-1], tangents[1:]
         cosine = np.sum(first * second, axis=-1)
