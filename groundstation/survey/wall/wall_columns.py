@@ -20,6 +20,7 @@ from groundstation.survey.tools.instruments import PropagationMode, SurveyTool
 from groundstation.survey.wall.as_built import TOE, Columns, ColumnState, intersect_planes, plane_frame
 from groundstation.survey.wall.column_deviation import ColumnDesign
 from groundstation.survey.wall.plane_errors import PlaneErrors
+from groundstation.survey.wall.tight_depths import TightRange
 from groundstation.survey.well.ellipsoid import check_covariance
 from groundstation.survey.well.error_columns import ErrorColumns, error_columns
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
@@ -88,6 +89,7 @@ class Assumptions:
     step: float = 0.5  # m between planes
     layers: tuple[Layer, ...] = (Layer(-math.inf, None, 0.0),)
     radius_correlation: float = 1.0  # of two columns in one layer
+    tight: TightRange = field(default_factory=TightRange)  # the planes lie in it
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +126,7 @@ def build_wall(plans: Sequence[ColumnPlan], holes: Sequence[ColumnSurvey], assum
     """
     frame = plane_frame([plan.design for plan in plans])
     ways = [_way(plan, hole) for plan, hole in zip(plans, holes, strict=True)]
-    depths = _depths(plans, frame, assumed.step)
+    depths = _depths(plans, frame, assumed)
     count = len(plans)
     centres = np.full((count, len(depths), 2), np.nan)
     ends, surveyed = np.full((2, count), -np.inf)
@@ -205,12 +207,14 @@ def _last_survey(way: Way) -> int:
     return int(np.flatnonzero(way.md <= way.surveyed_md + SAME_END)[-1])
 
 
-def _depths(plans: Sequence[ColumnPlan], frame: Array, step: float) -> Array:
-    """Planes from the first head to the last toe, at most ``step`` apart."""
+def _depths(plans: Sequence[ColumnPlan], frame: Array, assumed: Assumptions) -> Array:
+    """Planes at most a step apart, from the first head to the last toe or over what is stated to be tight."""
     heads = np.array([plan.design.head for plan in plans])
     toes = heads + np.array([plan.design.length * plan.design.axis for plan in plans])
     top, bottom = float(np.min(heads @ frame[2])), float(np.max(toes @ frame[2]))
-    return np.append(np.arange(top, bottom - 1e-3, step), bottom)
+    stated = assumed.tight
+    top, bottom = top if stated.top is None else stated.top, bottom if stated.bottom is None else stated.bottom
+    return np.append(np.arange(top, bottom - 1e-3, assumed.step), bottom)
 
 
 def _alike(plans: Sequence[ColumnPlan], ways: Sequence[Way | None]) -> list[list[int]]:

@@ -13,6 +13,7 @@ from groundstation.survey.wall.wall_file import Wall, judge_wall, read_wall
 from groundstation.survey.wall.wall_verdict import FindingKind, Judgement, WallVerdict, judge_columns
 
 HEADS = "column,north_m,east_m,down_m,length_m,inclination_deg,azimuth_deg\n"
+SQUARE = [(0.0, 0.0), (0.0, 0.7), (0.7, 0.0), (0.7, 0.7)]
 LONG = ("A", 0.0, 0.0, 0.0, 20.0, 0.0, 0.0)
 
 
@@ -71,6 +72,10 @@ def test_over_the_depth_that_is_stated_they_are_tight(tmp_path: Path) -> None:
     ("more", "named"),
     [
         ("tight_from_m = 18\ntight_to_m = 5\n", "tight_from_m: expected a depth above tight_to_m, 5 m, got 18 m"),
+        (
+            "tight_from_m = 50\n",
+            "joint A-B has no depth in which it is to be tight: it begins at 50 m and ends at 20 m",
+        ),
         ("tight_to_m = 40\n", "column A ends at 20 m; expected a toe at 40 m"),
         ("tight_from_m = -3\n", "column A begins at 0 m: it opens at the top; expected a head at -3 m"),
         ('tight_to_m = "deep"\n', "tight_to_m: expected a finite number, got 'deep'"),
@@ -153,3 +158,14 @@ def test_a_wall_of_one_column_and_names_that_differ_by_case_are_refused(tmp_path
     stations.write_text(stations.read_text().replace("B,", "b,"))
     with pytest.raises(SurveyError, match="column b is not among the heads; B is"):
         read_wall(path)
+
+
+def test_a_grid_is_covered_over_the_depths_that_are_stated(tmp_path: Path) -> None:
+    """Above 4 m two of four columns are not there: a void that is not asked about."""
+    rows = [(name, *place, 4.0 * (name in "BC"), 8.0, 0.0, 0.0) for name, place in zip("ABCD", SQUARE, strict=True)]
+    more = 'layout = "grid"\nspacing_m = 0.7\ndepth_step_m = 1\n'
+    wall, found = judged(made(tmp_path, rows, more + "tight_from_m = 4\ntight_to_m = 8\n"))
+    assert (found.verdict, found.voids) == (WallVerdict.TIGHT, [])
+    np.testing.assert_array_equal(wall.columns.depths, [4.0, 5.0, 6.0, 7.0, 8.0])
+    with pytest.raises(SurveyError, match="begins at 4 m: it opens at the top"):
+        read_wall(made(tmp_path, rows, more))
