@@ -30,16 +30,15 @@ GROWTH = 8  # share of its rows by which a table grows
 ROW: Final = np.dtype(
     [
         *((name, np.int64) for name in ("sequence", "replaces", "hops", "samples", "flags", "number")),
-        *((name, np.uint32) for name in ("tube", "width")),
+        *((name, np.uint32) for name in ("tube", "width", "chain")),
         *((name, np.uint8) for name in ("trust", "quality")),
         *((name, np.float64) for name in ("at", "md", "yaw", "yaw_var", "systematic_var", "force_var", "settle_time")),
+        ("force", np.float64, AXES),
         ("lean", np.float64, 2),
         ("down", np.float64),
         ("cov", np.float64, (2, 2)),
         ("information", np.float64, (2, 2)),
         ("causes", np.float64, (2, CAUSES)),
-        ("departed", np.float64, 2),
-        ("departure", np.float64),
     ]
 )
 
@@ -125,7 +124,7 @@ class ResolvedStops:
         rows["information"] = weights_of(rows["cov"], rows["causes"], self.places, int(rows["width"].max()))
 
     def append_stop(self, other: ResolvedStops, row: int) -> int:
-        """Add a stop of another table, from which no departure is known yet; returns its row."""
+        """Add a stop of another table; returns its row."""
         own, known = len(self.forces), self.rows
         if own == len(known):
             self.rows = np.empty(own + own // GROWTH, ROW)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, insort
-from collections.abc import Sequence
 from operator import attrgetter
 
 import numpy as np
@@ -18,9 +17,10 @@ import numpy.typing as npt
 from groundstation.config import GroundConfig
 from groundstation.service.hole.deviation_alarms import AlarmList
 from groundstation.service.hole.history import History
-from groundstation.service.hole.movement import Moved, Movement
+from groundstation.service.hole.hole_adjustment import HoleAdjustment, directions_of
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
+from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import SharedErrors
@@ -47,16 +47,17 @@ class SurveyedHole:
         self._design = config.design
         self._stops = ResolvedStops()
         self._station_of: list[SurveyStation] = []  # of each of its rows
-        self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
         self._stations: list[SurveyStation] = []
-        self._movement = Movement(self._stops, self._station_of)
+        self._adjustment = HoleAdjustment(config, shared)
+        self._adjusted: Adjusted | None = None
+        self._directions: dict[float, Direction] = {}  # by the depth (m) of a station below the collar
         self._alarms = AlarmList()
         self._history = History()
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
         self._trajectory = Trajectory(collar=config.collar, keeps_columns=False)
         self._deviations = self._deviate()
         self._projection: Deviation | None = None
-        self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
+        self._is_settled = True  # whether all that came is in what follows from it
         self._newest_at = -math.inf  # s, rig time of the newest survey
         self.version = 0  # grows with every survey
         self.newest = 0  # number of the measurement that came last, revisions included
@@ -81,8 +82,7 @@ class SurveyedHole:
         self.version += 1
         self.newest += 1
         self._history.on_survey(epoch, at)
-        self._touched[station.md] = station
-        self._unsettled_since = min(self._unsettled_since, at)
+        self._is_settled = False
         self._newest_at = max(self._newest_at, at)
         return True
 
@@ -107,10 +107,10 @@ class SurveyedHole:
         return bool(np.any((self._stops.column("tube") == tube) & (self._stops.column("md") > 0.0)))
 
     @property
-    def moved(self) -> list[Moved]:
-        """Where the hole moved."""
+    def adjusted(self) -> Adjusted | None:
+        """The hole as it was adjusted; None before the first look at a station."""
         self.settle()
-        return self._movement.moved
+        return self._adjusted
 
     @property
     def alarms(self) -> AlarmList:
@@ -132,8 +132,7 @@ class SurveyedHole:
     def direction_of(self, station: SurveyStation) -> Direction:
         """Direction of the hole at a station, the transport of the string in it."""
         self.settle()
-        carried = self._carried.get(station.md)
-        return station.fused(self._config.weighting) if carried is None else carried.direction
+        return self._directions.get(station.md, self._config.collar)
 
     @property
     def has_transport(self) -> bool:
@@ -172,22 +171,30 @@ class SurveyedHole:
 
     def settle(self) -> None:
         """Work out what follows from the stops that have come since the last time."""
-        since, self._unsettled_since = self._unsettled_since, math.inf
-        if since < math.inf:
-            by_depth = self._touched | self._movement.judge_since(since)
-            changed, self._touched = [by_depth[md] for md in sorted(by_depth)], {}
-            self._fuse(changed)
-            self._work_out(changed)
+        is_settled, self._is_settled = self._is_settled, True
+        if not is_settled:
+            self._adjust()
+            self._work_out()
 
-    def _fuse(self, changed: Sequence[SurveyStation]) -> None:
-        """Fuse the stations of which something may have changed, together those that have one more stop."""
-        weighting = self._config.weighting
-        if weighting is Weighting.BAYES and (grown := [station for station in changed if station.lacks_newest]):
-            newest = self._stops.stack([station.stops.rows[-1] for station in grown])
-            SurveyStation.add_newest(grown, newest)
+    def _adjust(self) -> None:
+        """Adjust the hole to all looks that there are."""
+        below = [one for one in self._stations if one.md > 0.0]
+        mds = [one.md for one in below]
+        place = {id(one): number for number, one in enumerate(below, 1)}
+        station_of_row = np.array([place.get(id(one), 0) for one in self._station_of], np.intp)
+        collar = self._config.collar
+        self._adjusted = self._adjustment.adjust(self._stops, station_of_row, np.array(mds), collar)
+        found: list[Direction] = [] if self._adjusted is None else [*directions_of(self._adjusted, self._shared)]
+        if self._config.weighting is not Weighting.ADJUSTED:
+            found = [one.fused(self._config.weighting) for one in below]
+        if self.has_transport and found:
+            places = self._shared.transport_places(len(found) + 1)
+            self._carried = dict(zip(mds, carry_directions(collar, found, places), strict=True))
+            found = [carried.direction for carried in self._carried.values()]
+        self._directions = dict(zip(mds, found, strict=True))
 
-    def _work_out(self, changed: Sequence[SurveyStation]) -> None:
-        self._trajectory.put(self._directions(changed))
+    def _work_out(self) -> None:
+        self._trajectory.put(self._directions.items())
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)
         if worst is None:
@@ -195,23 +202,6 @@ class SurveyedHole:
         self._projection = project_to_target(self._trajectory[-1], self.direction_of(self._stations[-1]), self._design)
         self._alarms.judge_deviation("deviation", worst, self._newest_at)
         self._alarms.judge_deviation("projection", self._projection, self._newest_at)
-
-    def _directions(self, changed: Sequence[SurveyStation]) -> list[tuple[float, Direction]]:
-        """Stations in the hole (m, direction) that may be others than before.
-
-        Where the string turns in a bent hole these are all: what it turns by is that of the stations above, and of the
-        one below too.
-        """
-        weighting = self._config.weighting
-        if not self.has_transport:
-            return [(one.md, one.fused(weighting)) for one in changed if one.md > 0.0]
-        measured = [(one.md, one.fused(weighting)) for one in self._stations if one.md > 0.0]
-        if not measured:
-            return []
-        mds, directions = zip(*measured, strict=True)
-        places = self._shared.transport_places(len(measured) + 1)
-        self._carried = dict(zip(mds, carry_directions(self._config.collar, directions, places), strict=True))
-        return [(md, carried.direction) for md, carried in self._carried.items()]
 
     def _deviate(self) -> Deviations:
         """Deviations of the trajectory as it is drawn."""

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks, PathPrior, StartingPoint, StringPrior
 
 Array = npt.NDArray[np.float64]
+Truths = npt.NDArray[np.bool_]
 KNOWN_TURN = 0.3  # rad, standard deviation of a turn up to which it is used as it is told
 
 
@@ -40,7 +41,7 @@ def _vars_of_turns(looks: Looks, string: StringPrior) -> Array:
     return np.asarray(cov[tube, tube] + cov[make_up, make_up] + 2.0 * cov[tube, make_up])
 
 
-def _find_turns(looks: Looks, string: StringPrior, turns: Array, tangents: Array, unknown: Array) -> None:
+def _find_turns(looks: Looks, string: StringPrior, turns: Array, tangents: Array, unknown: Truths) -> None:
     """Turn first tubes and then make-ups whose turn is wide so that some looks agree with the directions there."""
     seen = looks.force[:, 0] + 1j * looks.force[:, 1]
     there = (tangents[looks.station, 0] + 1j * tangents[looks.station, 1]) * np.exp(-1j * looks.yaw)

@@ -1,0 +1,159 @@
+"""What is known of tubes and their joints before any look of them counts. No I/O.
+
+A node reports the variance of all constant errors of its yaw as one number: its mount and every joint above it. What a
+tube has more than the one above it is the joint between them; where that one is not known the joints count alike.
+
+The turn of a tube's yaw is that of its mount and of all joints up to the drive head. A tube that is added on top turns
+them all by another joint and takes the drive head with it: so it is the sum of a turn of the tube, against the joints
+below it, and of one of the make-up, which is named after the topmost tube.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.config import GroundConfig
+from groundstation.survey.adjustment.looks import StringPrior
+
+Array = npt.NDArray[np.float64]
+Chain = tuple[int, tuple[int, ...] | None]  # a tube, and those above it, lowest first, where their order is known
+Joint = tuple[int, ...]
+Hung = tuple[int, int]  # a tube in the string as it was hung at first, or once it was hung otherwise
+GRAVITY_STD = 2e-3  # m/s^2, of what is entered for the site
+LEAST_VAR = 1e-10  # rad^2, of a turn: marks are not read finer
+LEAST_STD = 1e-7  # rad and m/s^2, of what is stated as known
+DRIVE = 0  # above the topmost tube
+
+
+@dataclass(slots=True)
+class Hanging:
+    """Which tube hung below which, chain by chain as they came.
+
+    A tube that comes to hang under another one than before begins anew, with all others: what joints they have in
+    common with those before is not followed.
+
+    Attributes
+    ----------
+    tubes, make_ups : in the order in which they were met
+    """
+
+    tubes: dict[Hung, int] = field(default_factory=dict)
+    make_ups: dict[Hung, int] = field(default_factory=dict)
+    upper: dict[Hung, Hung] = field(default_factory=dict)
+    _lower: dict[Hung, Hung] = field(default_factory=dict)
+    _time: int = 0
+
+    def add_chain(self, chain: Chain) -> tuple[int, int]:
+        """Places of the tube of a chain and of its make-up."""
+        tube, above = chain
+        if above is None:
+            return self._place(self.tubes, (self._time, tube)), self._place(self.make_ups, (self._time, -tube))
+        pairs = list(pairwise([tube, *above]))
+        if not all(self._fits((self._time, lower), (self._time, upper)) for lower, upper in pairs):
+            self._time += 1
+        for lower, upper in pairs:
+            self.upper[self._time, lower] = self._time, upper
+            self._lower[self._time, upper] = self._time, lower
+        top = above[-1] if above else tube
+        return self._place(self.tubes, (self._time, tube)), self._place(self.make_ups, (self._time, top))
+
+    def _fits(self, lower: Hung, upper: Hung) -> bool:
+        return self.upper.get(lower, upper) == upper and self._lower.get(upper, lower) == lower
+
+    @staticmethod
+    def _place(places: dict[Hung, int], hung: Hung) -> int:
+        return places.setdefault(hung, len(places))
+
+    def joints_below(self, hung: Hung) -> list[Hung]:
+        """Tubes below one, whose joints upwards are between it and the lowest."""
+        found = []
+        while (lower := self._lower.get(hung)) is not None:
+            found.append(lower)
+            hung = lower
+        return found
+
+
+def prior_of_string(
+    config: GroundConfig, hanging: Hanging, chains: Sequence[Chain], systematic_vars: Sequence[float]
+) -> StringPrior:
+    """Prior of the tubes that hang so, of which chains have reported these systematic variances (rad^2) last."""
+    bias = math.radians(config.accelerometer_bias_std_deg) * config.gravity
+    tilt = math.radians(config.mount_tilt_std_deg)
+    count = len(hanging.tubes)
+    cov = covariance_of_turns(hanging, chains, systematic_vars, math.radians(config.mount_std_deg) ** 2)
+    return StringPrior(
+        np.full(count, max(bias, LEAST_STD)),
+        np.full(count, max(tilt, LEAST_STD)),
+        np.zeros(len(cov)),
+        cov,
+        config.gravity,
+        GRAVITY_STD,
+        math.radians(config.play_std_deg),
+    )
+
+
+def covariance_of_turns(
+    hanging: Hanging, chains: Sequence[Chain], systematic_vars: Sequence[float], mount_var: float
+) -> Array:
+    """Covariance (m + u, m + u), rad^2, of the turns of tubes and of make-ups."""
+    own = dict(zip(chains, systematic_vars, strict=True))
+    joints: dict[Joint, float] = {}
+    totals = {chain: max(total - mount_var, 0.0) for chain, total in own.items()}
+    for chain in chains:
+        joints |= joint_variances(chain, totals)
+    mounts = {chain[0]: min(mount_var, total) for chain, total in own.items()}
+    rows = [mounted(hanging, hung) for hung in hanging.tubes] + [made_up(hanging, hung) for hung in hanging.make_ups]
+    names = list(dict.fromkeys(name for row in rows for name, _ in row))
+    place = {name: number for number, name in enumerate(names)}
+    stds = [math.sqrt(mounts[name[1]] if len(name) == 2 else joints[name[1:]]) for name in names]
+    columns = np.zeros((len(rows), len(names)))
+    for row, parts in zip(columns, rows, strict=True):
+        for name, sign in parts:
+            row[place[name]] += sign * stds[place[name]]
+    return np.asarray(columns @ columns.T + LEAST_VAR * np.eye(len(rows)))
+
+
+def mounted(hanging: Hanging, hung: Hung) -> list[tuple[Joint, float]]:
+    """Errors in the turn of a tube, with their signs: its mount, less the joints below it."""
+    time, tube = hung
+    below = [hung, *hanging.joints_below(hung)]
+    return [((time, tube), 1.0), *(((time, lower[1], upper[1]), -1.0) for upper, lower in pairwise(below))]
+
+
+def made_up(hanging: Hanging, hung: Hung) -> list[tuple[Joint, float]]:
+    """Errors in the turn of a make-up: all joints below its topmost tube, and the drive head on it."""
+    time, top = hung
+    if top < 0:
+        return [((time, -top, DRIVE, DRIVE), 1.0)]
+    below = [hung, *hanging.joints_below(hung)]
+    return [((time, top, DRIVE), 1.0), *(((time, lower[1], upper[1]), 1.0) for upper, lower in pairwise(below))]
+
+
+def joint_variances(chain: Chain, totals: Mapping[Chain, float]) -> dict[Joint, float]:
+    """Variance (rad^2) of every joint above a tube, by its lower and upper tube.
+
+    Parameters
+    ----------
+    chain : the tube and those above it
+    totals : rad^2, sum of the joints of every chain that has reported
+    """
+    tube, above = chain
+    if above is None:
+        return {(tube, DRIVE, DRIVE): totals[chain]}
+    names = [(lower, upper) for lower, upper in pairwise([tube, *above, DRIVE])]
+    found: dict[Joint, float] = {}
+    known = totals[chain]
+    waiting = [names[0]]
+    for place in range(1, len(names)):
+        upper = totals.get((above[place - 1], above[place:]))
+        if upper is not None:
+            found |= dict.fromkeys(waiting, max(known - upper, 0.0) / len(waiting))
+            known, waiting = upper, []
+        waiting.append(names[place])
+    return found | dict.fromkeys(waiting, known / len(waiting))
