@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.blunders import Blunder, Explanation
-from groundstation.survey.adjustment.hypotheses import OF_FORCE, BlunderKind
+from groundstation.survey.adjustment.hypotheses import BY_DEPTH, OF_FORCE, BlunderKind
 from groundstation.survey.adjustment.string_run import StringRun
 
 Array = npt.NDArray[np.float64]
@@ -36,27 +36,26 @@ SENTENCES: Mapping[BlunderKind, str] = {
 }
 
 
-def say_blunder(blunder: Blunder, run: StringRun, station_md: Array, tubes: Sequence[str]) -> str:
+def say_blunder(blunder: Blunder, run: StringRun, tubes: Sequence[str]) -> str:
     """A blunder as a sentence; of a doubt both explanations.
 
     Parameters
     ----------
-    run : gives the depth of stops
-    station_md : (s + 1,) m, of collar and stations
+    run : gives the depth of stops and stations
     tubes : names of tubes by their places
     """
-    best = say_explanation(blunder.best, run, station_md, tubes)
+    best = say_explanation(blunder.best, run, tubes)
     if blunder.second is None or not blunder.is_doubt:
         return best
-    return f"{best}, or {say_explanation(blunder.second, run, station_md, tubes)}: the readings do not tell which"
+    return f"{best}, or {say_explanation(blunder.second, run, tubes)}: the readings do not tell which"
 
 
-def say_explanation(one: Explanation, run: StringRun, station_md: Array, tubes: Sequence[str]) -> str:
+def say_explanation(one: Explanation, run: StringRun, tubes: Sequence[str]) -> str:
     """One explanation as a sentence."""
     kind, subject = one.hypothesis.kind, one.hypothesis.subject
     words = {"size": say_size(one), "depth": f"{run.md[one.hypothesis.stop]:.1f} m"}
     if kind is K.HOLE_MOVED:
-        words |= {"first": f"{station_md[subject[0]]:.1f} m", "last": f"{station_md[subject[1]]:.1f} m"}
+        words |= {"first": f"{run.station_md[subject[0]]:.1f} m", "last": f"{run.station_md[subject[1]]:.1f} m"}
     elif subject:
         words |= {"tube": tubes[subject[0]], "other": tubes[subject[-1]]}
     return SENTENCES[kind].format(**words)
@@ -79,7 +78,7 @@ def unit_of(kind: BlunderKind) -> tuple[str, float]:
         return "mg an hour", HOUR * 1e3 / STANDARD_GRAVITY
     if kind in OF_FORCE:
         return "mg", 1e3 / STANDARD_GRAVITY
-    if kind in (K.DEPTH_WRONG_ONCE, K.DEPTH_WRONG_FROM):
+    if kind in BY_DEPTH:
         return "m", 1.0
     return "deg", 180.0 / math.pi
 

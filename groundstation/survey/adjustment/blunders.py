@@ -158,6 +158,11 @@ def find_blunder(
     return Blunder(best, second, global_ratio(found), global_ratio(with_best.found))
 
 
+def chance_of_one(looks: Looks, run: StringRun) -> float:
+    """Chance of a false alarm that one hypothesis has at the last stop, so that a whole hole keeps its own."""
+    return FALSE_ALARM * math.exp(-log_of_stops(looks)) / max(1, sum(1 for _ in all_hypotheses(looks, run)))
+
+
 def log_of_stops(looks: Looks) -> float:
     """Logarithm of k (k + 1), the part of all false alarms that is spent at the stop k: in sum over all stops, one."""
     count = max(1, len(np.unique(looks.stop)))

@@ -21,6 +21,7 @@ from groundstation.survey.adjustment.string_run import JOINT, StringRun
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
+SHORT = 0.05  # m, over which a hole has one curvature
 FEWEST_TO_CREEP = 2  # looks after the last right one; with one it is a step
 MOST_MOVED = 4  # neighbouring stations that move together
 RECENT, EARLIER = 16, 8  # stops from which on, where there are more than both
@@ -53,12 +54,13 @@ OF_FORCE = (K.BIAS_STEPPED, K.BIAS_CREEPS, K.BIAS_WRONG, K.LOOK_WRONG)
 CONSTANT = (K.BIAS_WRONG, K.TILT_WRONG, K.MOUNT_MISREAD, K.JOINT_MISREAD)
 KNOWN_SIZE = (K.AXES_EXCHANGED, K.TUBES_EXCHANGED)  # of amplitude one, put right in the looks themselves
 BY_TILT = (K.TILT_SLIPPED, K.TILT_WRONG)
+BY_DEPTH = (K.DEPTH_WRONG_ONCE, K.DEPTH_WRONG_FROM)
 OF_CHAIN = (K.JOINT_SLIPPED, K.JOINT_MISREAD, K.ENCODER_SLIPPED)
 BY_TURN = (K.MOUNT_TURNED, K.MOUNT_MISREAD, *OF_CHAIN)
 WIDTHS = {
     **dict.fromkeys(OF_FORCE, 3),
     **dict.fromkeys((*BY_TILT, K.HOLE_MOVED), 2),
-    **dict.fromkeys((*BY_TURN, K.DEPTH_WRONG_ONCE, K.DEPTH_WRONG_FROM, *KNOWN_SIZE), 1),
+    **dict.fromkeys((*BY_TURN, *BY_DEPTH, *KNOWN_SIZE), 1),
 }
 
 
@@ -79,11 +81,12 @@ class Hypothesis:
 
 
 def effect_of(
-    one: Hypothesis, looks: Looks, run: StringRun, now: StartingPoint, linear: Linearised
+    one: Hypothesis, looks: Looks, run: StringRun, now: StartingPoint, linear: Linearised, reach: float = 0.0
 ) -> tuple[Places, Array]:
     """Looks (r,) that a hypothesis changes, and the change (r, 3, q) of their force for one unit of it.
 
-    Units are m/s^2 (a second, of a creep), rad, m, or one for what has a known size.
+    Units are m/s^2 (a second, of a creep), rad, m, or one for what has a known size. Of a depth that is wrong by about
+    ``reach`` (m) it is the mean change over that length.
     """
     amplitude = amplitudes(one, looks, run)
     rows = np.flatnonzero(amplitude)
@@ -101,8 +104,19 @@ def effect_of(
     elif one.kind is K.TUBES_EXCHANGED:
         columns = np.einsum("kab,kb->ka", by[:, :, :2], _apart(one, looks, now, linear, rows))[:, :, None]
     else:
-        columns = np.einsum("kab,kb->ka", by[:, :, :2], now.curvatures[looks.station[rows]])[:, :, None]
+        bent = _bent_by_metre(run.station_md, now, linear, reach)[looks.station[rows]]
+        columns = np.einsum("kab,kb->ka", by[:, :, :2], bent)[:, :, None]
     return rows, np.asarray(columns * amplitude[rows, None, None])
+
+
+def _bent_by_metre(md: Array, now: StartingPoint, linear: Linearised, reach: float) -> Array:
+    """How the hole bends (s + 1, 2) from each station on, rad/m, in the mean over ``reach`` m, which may be upward."""
+    if abs(reach) < SHORT:
+        return now.curvatures
+    there = np.stack([np.interp(md + reach, md, one) for one in now.tangents.T], axis=1)
+    bent = np.einsum("sai,si->sa", linear.bases, there - now.tangents) / reach
+    beyond = np.clip(md + reach - md[-1], 0.0, abs(reach))[:, None] / abs(reach)
+    return np.asarray(bent + beyond * now.curvatures[-1])
 
 
 def _apart(one: Hypothesis, looks: Looks, now: StartingPoint, linear: Linearised, rows: Places) -> Array:
@@ -140,7 +154,7 @@ def _is_touched(one: Hypothesis, looks: Looks) -> npt.NDArray[np.bool_]:
         return np.asarray(since & (looks.station >= one.subject[0]) & (looks.station <= one.subject[1]))
     if one.kind in (K.DEPTH_WRONG_ONCE, K.LOOK_WRONG):
         since = looks.stop == one.stop
-    if one.kind in (*OF_CHAIN, K.DEPTH_WRONG_ONCE, K.DEPTH_WRONG_FROM):
+    if one.kind in (*OF_CHAIN, *BY_DEPTH):
         return since
     return np.asarray(since & (looks.tube == one.subject[0]))
 

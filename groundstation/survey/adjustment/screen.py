@@ -20,24 +20,26 @@ from groundstation.survey.adjustment.string_run import StringRun
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
-SUSPICIOUS = math.log(1e-3)  # of the least likely of all, their number counted by ``log_chances``
+SUSPICIOUS = 0.05  # chance that an honest hole is looked into more closely at a stop
+PLAY_TOO_LARGE = 10.0  # times the variance that was told
 LATEST = 16  # stops
 LEAST_TOLD = 1e-6  # part of a variance
 MOST_WHOLE = 150  # looks up to which the screen is exact
 
 
 def is_suspicious(found: Adjusted, run: StringRun) -> bool:
-    """Whether a hole is worth asking what is wrong with it."""
-    return least_chance(found, run) < SUSPICIOUS
+    """Whether a hole is worth asking what is wrong with it; where tubes seem to lie far more askew than told, it is."""
+    too_large = found.now.play_var > PLAY_TOO_LARGE * found.string.play_std**2
+    return bool(too_large or least_chance(found, run) < math.log(SUSPICIOUS))
 
 
 def least_chance(found: Adjusted, run: StringRun) -> float:
-    """Logarithm of the chance that an honest hole has one test as unlikely as the worst here."""
+    """Logarithm of the chance, at most, that an honest hole has any test as unlikely as the worst here."""
     is_whole = len(found.looks) <= MOST_WHOLE
     tests = [against_prior(found), *(whole_tests(found, run) if is_whole else late_tests(found))]
     left, redundancy = (found.squares, found.redundancy) if is_whole else (1e9, 1e9)
     chances = [log_chances(squares, told, left, redundancy) for squares, told in tests]
-    return min(float(np.min(some, initial=0.0)) for some in chances)
+    return min(float(np.min(some, initial=0.0)) for some in chances) + math.log(sum(len(some) for some in chances))
 
 
 def against_prior(found: Adjusted) -> tuple[Array, Places]:
@@ -64,7 +66,7 @@ def whole_tests(found: Adjusted, run: StringRun) -> list[tuple[Array, Places]]:
     tests = [_squares(pulled, found.linear.weights, white)]
     order, ends = _from_the_end(found.looks.tube, found.looks.stop)
     sums = [_sums(part[order], ends) for part in (pulled, found.linear.weights, white)]
-    return [*tests, _squares(*sums), _turn_test(found, run, pulled, white)]
+    return [*tests, _squares(*sums), _turn_test(found, run, pulled, white), *_hole_tests(found, pulled, white)]
 
 
 def _squares(pulled: Array, whole: Array, white: Array) -> tuple[Array, Places]:
@@ -88,6 +90,27 @@ def _turn_test(found: Adjusted, run: StringRun, pulled: Array, white: Array) -> 
         np.add.at(table, (looks.tube, stop), part)
         sums.append(np.tensordot(pattern, np.cumsum(table[:, ::-1], axis=1), axes=1).reshape(-1, part.shape[1]))
     return _squares(sums[0], sums[1][:, :, None], sums[2][:, :, None])
+
+
+def _hole_tests(found: Adjusted, pulled: Array, white: Array) -> list[tuple[Array, Places]]:
+    """Of two neighbouring stations from every stop on, and of the depth at and from every stop on."""
+    looks, jacobians = found.looks, found.linear.jacobians
+    stops = np.unique(looks.stop)
+    since = looks.stop >= stops[:, None]
+    pairs = np.arange(1, max(2, len(found.path.md) - 1))[:, None]
+    near = (looks.station == pairs) | (looks.station == pairs + 1)
+    along = np.einsum("kab,kb->ka", jacobians[:, :, :2], found.now.curvatures[looks.station])[:, :, None]
+    moved = (since[:, None] & near).reshape(-1, len(looks))
+    at_depth = np.concatenate([since, looks.stop == stops[:, None]])
+    masks = ((moved, jacobians[:, :, :2]), (at_depth, along))
+    return [_masked_test(found, pulled, white, mask.astype(float), columns) for mask, columns in masks]
+
+
+def _masked_test(found: Adjusted, pulled: Array, white: Array, masks: Array, columns: Array) -> tuple[Array, Places]:
+    """Of columns (n, 3, q) in the looks that each mask (h, n) lets through."""
+    whole = np.swapaxes(columns, 1, 2) @ found.linear.weights @ columns
+    score = np.einsum("ka,kaq->kq", pulled, columns)
+    return _squares(*(np.tensordot(masks, part, axes=1) for part in (score, whole, white @ columns)))
 
 
 def late_tests(found: Adjusted) -> list[tuple[Array, Places]]:

@@ -43,11 +43,13 @@ class StringRun:
     Parameters
     ----------
     md, time : (k,) m and s, depth of the bit and time of every stop by its number
+    station_md : (s + 1,) m, of collar and stations, as ``PathPrior`` has them
     causes : of the turns of its tubes
     """
 
     md: Array
     time: Array
+    station_md: Array
     causes: TurnCauses
 
 

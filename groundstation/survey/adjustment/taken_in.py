@@ -1,9 +1,9 @@
 """A hole adjusted with blunders that are taken in: as further unknowns, or put right in the looks themselves.
 
 A step of a bias is a further unknown with a wide prior. A turn is so too, and the looks are turned back by what is
-found until nothing more is, for a turn of many degrees is not linear. What has a known size (axes or tubes exchanged)
-is put right in the looks. Source: Teunissen, "An integrity and quality control procedure for use in multi sensor
-integration", ION GPS (1990): detection, identification, adaptation.
+found until nothing more is, for a turn of many degrees is not linear; nor is a wrong depth where the hole bends. What
+has a known size (axes or tubes exchanged) is put right in the looks. Source: Teunissen, "An integrity and quality
+control procedure for use in multi sensor integration", ION GPS (1990): detection, identification, adaptation.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from groundstation.survey.adjustment.adjust import adjust_hole, linearise_all
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.equations import path_equations, string_departure
 from groundstation.survey.adjustment.hypotheses import (
+    BY_DEPTH,
     BY_TILT,
     BY_TURN,
     KNOWN_SIZE,
@@ -70,23 +71,26 @@ def adjust_with(
     looks = put_right(looks, blunders)
     sought = [one for one in blunders if one.kind not in KNOWN_SIZE]
     now = replace(start or first_start(looks, string, path), extra=np.zeros(0))
-    at = _places(sought)
-    is_turn = np.repeat([one.kind in BY_TURN for one in sought], [WIDTHS[one.kind] for one in sought]).astype(bool)
-    turned, turned_looks = np.zeros(len(is_turn)), looks
-    for _ in range(ROUNDS if is_turn.any() else 1):
-        extra = further_effects(turned_looks, run, sought, now, string)
-        found = adjust_hole(turned_looks, string, path, extra, replace(now, extra=np.zeros(len(extra.std))))
-        cov = found.common_cov[len(found.common_cov) - len(is_turn) :, len(found.common_cov) - len(is_turn) :]
-        more = np.where(is_turn, found.now.extra, 0.0)
-        turned = turned + more
-        if np.all(np.abs(more) <= SETTLED * np.sqrt(np.diag(cov))):
+    is_turn, is_bent = (_is_of(sought, kinds) for kinds in (BY_TURN, BY_DEPTH))
+    sizes, turned = np.zeros(len(is_turn)), looks
+    for _ in range(ROUNDS if np.any(is_turn | is_bent) else 1):
+        extra = further_effects(turned, run, sought, now, sizes)
+        found = adjust_hole(turned, string, path, extra, replace(now, extra=np.zeros(len(extra.std))))
+        cov = found.common_cov[len(found.common_cov) - len(sizes) :, len(found.common_cov) - len(sizes) :]
+        before, sizes = sizes, found.now.extra + np.where(is_turn, sizes, 0.0)
+        more = np.abs(sizes - before)[is_turn | is_bent]
+        if np.all(more <= SETTLED * np.sqrt(np.diag(cov))[is_turn | is_bent]):
             break
-        now = found.now
-        turned_looks = _turned_back(looks, run, sought, turned)
-    total = np.where(is_turn, turned, found.now.extra)
-    shown = iter(at)
+        now = replace(found.now, extra=np.zeros(0))
+        turned = _turned_back(looks, run, sought, sizes)
+    shown = iter(_places(sought))
     slices = [slice(0, 0) if one.kind in KNOWN_SIZE else next(shown) for one in blunders]
-    return TakenIn(found, tuple(total[one] for one in slices), tuple(cov[one, one] for one in slices))
+    return TakenIn(found, tuple(sizes[one] for one in slices), tuple(cov[one, one] for one in slices))
+
+
+def _is_of(sought: Sequence[Hypothesis], kinds: Sequence[BlunderKind]) -> npt.NDArray[np.bool_]:
+    """Which columns are of some kinds."""
+    return np.array([one.kind in kinds for one in sought for _ in range(WIDTHS[one.kind])], bool)
 
 
 def _places(sought: Sequence[Hypothesis]) -> list[slice]:
@@ -114,9 +118,9 @@ def _turned_back(looks: Looks, run: StringRun, sought: Sequence[Hypothesis], siz
 
 
 def further_effects(
-    looks: Looks, run: StringRun, sought: Sequence[Hypothesis], now: StartingPoint, string: StringPrior
+    looks: Looks, run: StringRun, sought: Sequence[Hypothesis], now: StartingPoint, sizes: Array
 ) -> FurtherEffects:
-    """Blunders of unknown size as further unknowns of an adjustment that begins at ``now``."""
+    """Blunders of unknown size, about ``sizes``, as further unknowns of an adjustment that begins at ``now``."""
     if not sought:
         return FurtherEffects(np.zeros((len(looks), 3, 0)), np.zeros(0))
     nothing = FurtherEffects(np.zeros((len(looks), 3, 0)), np.zeros(0))
@@ -124,7 +128,8 @@ def further_effects(
     columns = np.zeros((len(looks), 3, sum(WIDTHS[one.kind] for one in sought)))
     stds = np.empty(columns.shape[2])
     for one, at in zip(sought, _places(sought), strict=True):
-        rows, effect = effect_of(one, looks, run, now, linear)
+        reach = float(sizes[at.start]) if one.kind in BY_DEPTH else 0.0
+        rows, effect = effect_of(one, looks, run, now, linear, reach)
         columns[rows, :, at] = effect
         stds[at] = wide_std(one, looks, run)
     return FurtherEffects(columns, stds)
