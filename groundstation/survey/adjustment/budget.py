@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.equations import KNOWN, path_equations
-from groundstation.survey.adjustment.looks import BIAS, OF_TUBE, TILT, TURN
+from groundstation.survey.adjustment.equations import KNOWN, path_equations, turn_places
+from groundstation.survey.adjustment.looks import BIAS, OF_TUBE, TILT
 from groundstation.survey.adjustment.string_run import TurnCauses
-from groundstation.survey.adjustment.toe_weights import toe_weights
+from groundstation.survey.adjustment.toe_weights import moved_looks, toe_weights
 
 Array = npt.NDArray[np.float64]
 
@@ -71,14 +71,14 @@ def error_budget(found: Adjusted, weights: Array, causes: TurnCauses) -> list[Er
     states, common = found.cofactor(weights, np.zeros((len(found.common_cov), weights.shape[2])))
     tubes = common[: OF_TUBE * found.string.count].reshape(found.string.count, OF_TUBE, -1)
     of_string = found.string.count * OF_TUBE
-    further = common[of_string + 1 :] ** 2 / (found.extra.std[:, None] ** 2)
+    further = common[found.string.width :] ** 2 / (found.extra.std[:, None] ** 2)
     gravity = common[of_string] ** 2 / found.string.gravity_std**2
     collar, path = _of_path(found, states)
     return [
-        *_of_looks(found, states, tubes, common[of_string:]),
+        *_of_looks(found, moved_looks(found, states, common)),
         *_by_tube(ErrorSource.BIAS, np.sum(tubes[:, BIAS] ** 2, axis=1) / found.string.bias_std[:, None] ** 2),
         *_by_tube(ErrorSource.TILT, np.sum(tubes[:, TILT] ** 2, axis=1) / found.string.tilt_std[:, None] ** 2),
-        *_of_turns(found, tubes[:, TURN], causes),
+        *_of_turns(found, common[turn_places(found.string)], causes),
         ErrorShare(ErrorSource.GRAVITY, -1, gravity),
         ErrorShare(ErrorSource.COLLAR, -1, collar),
         ErrorShare(ErrorSource.PATH, -1, path),
@@ -90,12 +90,9 @@ def _by_tube(source: ErrorSource, variances: Array) -> list[ErrorShare]:
     return [ErrorShare(source, subject, one) for subject, one in enumerate(variances)]
 
 
-def _of_looks(found: Adjusted, states: Array, tubes: Array, rest: Array) -> list[ErrorShare]:
+def _of_looks(found: Adjusted, moved: Array) -> list[ErrorShare]:
     """Noise of the force, play and noise of the yaw; what a look that counts less adds is theirs in proportion."""
     looks, linear = found.looks, found.linear
-    of_look = np.concatenate([states[looks.station, :2], tubes[looks.tube]], axis=1)
-    moved = linear.jacobians[:, :, :8] @ of_look + np.einsum("ka,r->kar", linear.jacobians[:, :, 8], rest[0])
-    moved += np.einsum("kae,er->kar", found.extra.columns, rest[1:])
     pulled = linear.weights @ moved
     whole = np.einsum("kar,kar->kr", pulled, moved)
     play = np.swapaxes(linear.jacobians[:, :, 5:7], 1, 2) @ pulled
@@ -114,7 +111,8 @@ def _of_looks(found: Adjusted, states: Array, tubes: Array, rest: Array) -> list
 def _of_turns(found: Adjusted, turns: Array, causes: TurnCauses) -> list[ErrorShare]:
     """Of each cause of turns, and of what is in their covariance beside the named ones."""
     weighed = np.linalg.solve(found.string.turn_cov, turns)
-    named = (causes.stds[:, None] * (causes.patterns @ weighed)) ** 2
+    patterns = np.concatenate([causes.of_tubes, causes.of_make_ups], axis=1)
+    named = (causes.stds[:, None] * (patterns @ weighed)) ** 2
     rest = np.sum(weighed * turns, axis=0) - named.sum(axis=0)
     return [*_by_tube(ErrorSource.TURN, named), ErrorShare(ErrorSource.TURN, -1, rest)]
 

@@ -139,7 +139,7 @@ def amplitudes(one: Hypothesis, looks: Looks, run: StringRun) -> Array:
     """How much (n,) of a hypothesis is in each look; 0 in those that it leaves alone."""
     amount: Array | float = 1.0
     if one.kind in OF_CHAIN:
-        amount = _turned_by(one, run)[looks.tube]
+        amount = _turned_by(one, looks, run)
     elif one.kind is K.BIAS_CREEPS:
         amount = run.time[looks.stop] - run.time[one.stop]
     return np.where(_is_touched(one, looks), amount, 0.0)
@@ -159,11 +159,11 @@ def _is_touched(one: Hypothesis, looks: Looks) -> npt.NDArray[np.bool_]:
     return np.asarray(since & (looks.tube == one.subject[0]))
 
 
-def _turned_by(one: Hypothesis, run: StringRun) -> Array:
-    """Turn (m,) of every tube for one radian of a joint or of the encoder."""
+def _turned_by(one: Hypothesis, looks: Looks, run: StringRun) -> Array:
+    """Turn (n,) of the yaw of every look for one radian of a joint or of the encoder."""
     if one.kind is K.ENCODER_SLIPPED:
-        return np.ones(run.causes.patterns.shape[1])
-    return np.asarray(run.causes.patterns[run.causes.names.index((JOINT, one.subject[0]))])
+        return np.ones(len(looks))
+    return np.asarray(run.causes.turned_looks(looks)[run.causes.names.index((JOINT, one.subject[0]))])
 
 
 def all_hypotheses(looks: Looks, run: StringRun) -> Iterator[Hypothesis]:

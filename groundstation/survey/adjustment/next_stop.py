@@ -2,7 +2,7 @@
 
 Every tube goes one station down, the lowest to a new one; the tool faces of all turn by one angle. A bias of a tube
 and the direction of the hole look alike from one tool face and apart from another, so a turn between stops tells
-them. The looks to come have the covariance of those at this stop; the update is linear.
+them. The looks to come have the covariance of those at this stop, and the turns of its make-up; the update is linear.
 Source: optimal design of a linear estimate, Fedorov, "Theory of Optimal Experiments", Academic Press (1972).
 """
 
@@ -59,7 +59,7 @@ def plan_stop(found: Adjusted, length: float, angle_count: int = 24) -> NextStop
     length : m, to the next station
     angle_count : angles that are tried, evenly around from no turn on
     """
-    angles: Array = np.arange(angle_count) * (2.0 * np.pi / angle_count)
+    angles = np.linspace(0.0, 2.0 * np.pi, angle_count, endpoint=False, dtype=np.float64)
     last = _last_of_tubes(found.looks)
     jacobians, noise = _looks_to_come(found, last, length, angles)
     cov, toe_cov, of_toe = _covariances(found, last, length)
@@ -88,15 +88,16 @@ def _looks_to_come(found: Adjusted, last: Places, length: float, angles: Array) 
     bases = np.concatenate([found.linear.bases, found.linear.bases[-1:]])
     yaw = (looks.yaw[last] + angles[:, None]).ravel()
     tube, station = (np.tile(one, len(angles)) for one in (looks.tube[last], looks.station[last] + 1))
-    psi = yaw - now.tubes[tube, TURN]
+    make_up = np.tile(looks.make_up[last], len(angles))
+    psi = yaw - now.tubes[tube, TURN] - now.make_ups[make_up]
     d = tangents[station]
     lean = (d[:, 0] + 1j * d[:, 1]) * np.exp(-1j * psi)
     force = now.gravity * np.stack([lean.real, lean.imag, -d[:, 2]], axis=1) + now.tubes[tube, :3]
     jacobians, weights = np.empty((count, 3, OF_LOOK)), np.empty((count, 3, 3))
     force_var, yaw_var = (np.tile(one[last], len(angles)) for one in (looks.force_var, looks.yaw_var))
     linearise_looks(
-        station, tube, force, force_var, yaw, yaw_var, tangents, bases, now.tubes, now.gravity, now.play_var,
-        jacobians, weights, np.empty((count, 3)), np.empty(count),
+        station, tube, make_up, force, force_var, yaw, yaw_var, tangents, bases, now.tubes, now.make_ups, now.gravity,
+        now.play_var, jacobians, weights, np.empty((count, 3)), np.empty(count),
     )  # fmt: skip
     shape = (len(angles), len(last), 3)
     return jacobians.reshape(*shape, OF_LOOK), np.linalg.inv(weights).reshape(*shape, 3)
@@ -116,19 +117,30 @@ def _covariances(found: Adjusted, last: Places, length: float) -> tuple[Array, f
     new[np.flatnonzero(found.looks.station[last] == len(found.path.md) - 1)[:, None] * 2 + [0, 1], [0, 1]] = 1.0
     new[2 * count :] = 0.5 * length * found.linear.bases[-1].T
     of_states += spread * new @ new.T
-    own = found.looks.tube[last, None] * OF_TUBE + np.arange(OF_TUBE)
-    gravity = np.full((count, 1), found.string.count * OF_TUBE)
-    at = np.concatenate([own, gravity], axis=1).ravel()
-    crossed = (found.common_cov[at] @ by_common).reshape(count, OF_TUBE + 1, -1)
+    of_looks, of_all = _covariances_in_common(found, last)
+    crossed = (of_all @ by_common).reshape(count, OF_TUBE + 1, -1)
     cov = np.empty((count, OF_LOOK, count, OF_LOOK))
     cov[:, :2, :, :2] = of_states[: 2 * count, : 2 * count].reshape(count, 2, count, 2)
     cov[:, 2:, :, :2] = crossed[:, :, : 2 * count].reshape(count, OF_TUBE + 1, count, 2)
     cov[:, :2, :, 2:] = cov[:, 2:, :, :2].transpose(2, 3, 0, 1)
-    cov[:, 2:, :, 2:] = found.common_cov[np.ix_(at, at)].reshape(count, OF_TUBE + 1, count, OF_TUBE + 1)
-    of_toe = np.concatenate(
-        [of_states[: 2 * count, 2 * count :].reshape(count, 2, 3), crossed[:, :, 2 * count :]], axis=1
-    )
-    return cov, float(np.trace(of_states[2 * count :, 2 * count :])), np.asarray(of_toe)
+    cov[:, 2:, :, 2:] = of_looks.reshape(count, OF_TUBE + 1, count, OF_TUBE + 1)
+    by_path = of_states[: 2 * count, 2 * count :].reshape(count, 2, 3)
+    of_toe = np.asarray(np.concatenate([by_path, crossed[:, :, 2 * count :]], axis=1), np.float64)
+    return cov, float(np.trace(of_states[2 * count :, 2 * count :])), of_toe
+
+
+def _covariances_in_common(found: Adjusted, last: Places) -> tuple[Array, Array]:
+    """Covariance of tube, whole turn and gravity of the looks, (7 t, 7 t), and with all in common, (7 t, p)."""
+    first = found.string.count * OF_TUBE
+    own = found.looks.tube[last, None] * OF_TUBE + np.arange(OF_TUBE)
+    at = np.concatenate([own, np.full((len(last), 1), first)], axis=1).ravel()
+    turns = np.arange(len(last)) * (OF_TUBE + 1) + TURN
+    make_ups = first + 1 + found.looks.make_up[last]
+    of_all = found.common_cov[at]
+    of_all[turns] += found.common_cov[make_ups]
+    of_looks = of_all[:, at]
+    of_looks[:, turns] += of_all[:, make_ups]
+    return of_looks, of_all
 
 
 def _by_common(found: Adjusted, wanted: Array, of_looks: int) -> Array:

@@ -17,9 +17,9 @@ import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, BlunderKind, Hypothesis, effect_of
-from groundstation.survey.adjustment.looks import OF_TUBE
 from groundstation.survey.adjustment.scores import UNTOLD, free_information
 from groundstation.survey.adjustment.string_run import StringRun
+from groundstation.survey.adjustment.toe_weights import moved_looks
 
 Array = npt.NDArray[np.float64]
 FOUND_WITH, FALSE_ALARM_OF_ONE = 0.8, 1e-3
@@ -82,11 +82,7 @@ def measure_reliability(
 def moved_by_functional(found: Adjusted, weights: Array) -> Array:
     """W A Q w (n, 3, r): how much a unit of force in each look moves each functional."""
     states, common = found.cofactor(weights, np.zeros((len(found.common_cov), weights.shape[2])))
-    looks, jacobians, count = found.looks, found.linear.jacobians, OF_TUBE * found.string.count
-    tubes = common[:count].reshape(found.string.count, OF_TUBE, -1)
-    moved = jacobians[:, :, :2] @ states[looks.station, :2] + jacobians[:, :, 2:8] @ tubes[looks.tube]
-    moved += jacobians[:, :, 8:9] * common[count] + found.extra.columns @ common[count + 1 :]
-    return np.asarray(found.linear.weights @ moved)
+    return np.asarray(found.linear.weights @ moved_looks(found, states, common))
 
 
 def _of_one(

@@ -107,8 +107,10 @@ def pulled_unknowns(found: Adjusted, rows: Places, weighed: Array) -> tuple[Arra
     np.add.at(of_path, looks.station[rows], pulled[:, :2])
     tubes = np.zeros((found.string.count, OF_TUBE, width))
     np.add.at(tubes, looks.tube[rows], pulled[:, 2:8])
+    make_ups = np.zeros((len(found.now.make_ups), width))
+    np.add.at(make_ups, looks.make_up[rows], pulled[:, 7])
     further = np.einsum("kae,kar->er", found.extra.columns[rows], weighed)
-    return of_path, np.concatenate([tubes.reshape(-1, width), pulled[:, 8].sum(axis=0)[None], further])
+    return of_path, np.concatenate([tubes.reshape(-1, width), pulled[:, 8].sum(axis=0)[None], make_ups, further])
 
 
 def best_sizes(scores: Array, whole: Array, free: Array) -> tuple[Array, Array, Places, Array]:

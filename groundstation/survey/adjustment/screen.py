@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.equations import string_departure
-from groundstation.survey.adjustment.looks import BIAS, OF_TUBE, TILT, TURN
+from groundstation.survey.adjustment.equations import string_departure, turn_places
+from groundstation.survey.adjustment.looks import BIAS, OF_TUBE, TILT
 from groundstation.survey.adjustment.scores import best_sizes, log_chances, whitened_effects
 from groundstation.survey.adjustment.string_run import StringRun
 
@@ -43,14 +43,15 @@ def least_chance(found: Adjusted, run: StringRun) -> float:
 
 
 def against_prior(found: Adjusted) -> tuple[Array, Places]:
-    """Squares, each of one degree of freedom, of bias, tilt and turn of tubes against what was known of them."""
-    count = OF_TUBE * found.string.count
-    off = string_departure(found.string, found.now)[:count] + found.solution.common[:count]
-    stds = np.ones((found.string.count, OF_TUBE))
-    stds[:, BIAS], stds[:, TILT] = found.string.bias_std[:, None], found.string.tilt_std[:, None]
-    stds[:, TURN] = np.sqrt(np.diag(found.string.turn_cov))
-    before = stds.ravel() ** 2
-    free = before - np.diag(found.common_cov)[:count]
+    """Squares, each of one degree of freedom, of bias, tilt and turns against what was known of them."""
+    string, width = found.string, found.string.width
+    off = string_departure(string, found.now)[:width] + found.solution.common[:width]
+    stds = np.ones((string.count, OF_TUBE))
+    stds[:, BIAS], stds[:, TILT] = string.bias_std[:, None], string.tilt_std[:, None]
+    before = np.ones(width)
+    before[: stds.size], before[stds.size] = stds.ravel() ** 2, string.gravity_std**2
+    before[turn_places(string)] = np.diag(string.turn_cov)
+    free = before - np.diag(found.common_cov)[:width]
     is_told = free > LEAST_TOLD * before
     return np.where(is_told, off * off / np.where(is_told, free, 1.0), 0.0), is_told.astype(np.intp)
 
@@ -76,20 +77,10 @@ def _squares(pulled: Array, whole: Array, white: Array) -> tuple[Array, Places]:
 
 def _turn_test(found: Adjusted, run: StringRun, pulled: Array, white: Array) -> tuple[Array, Places]:
     """Of every cause of turns from every stop on."""
-    by_turn, looks = found.linear.jacobians[:, :, 7], found.looks
-    stops, stop = np.unique(looks.stop, return_inverse=True)
-    parts = (
-        np.einsum("ka,ka->k", by_turn, pulled)[:, None],
-        np.einsum("ka,kab,kb->k", by_turn, found.linear.weights, by_turn)[:, None],
-        np.einsum("kda,ka->kd", white, by_turn),
-    )
-    patterns = run.causes.patterns
-    sums = []
-    for part, pattern in zip(parts, (patterns, patterns**2, patterns), strict=True):
-        table = np.zeros((found.string.count, len(stops), part.shape[1]))
-        np.add.at(table, (looks.tube, stop), part)
-        sums.append(np.tensordot(pattern, np.cumsum(table[:, ::-1], axis=1), axes=1).reshape(-1, part.shape[1]))
-    return _squares(sums[0], sums[1][:, :, None], sums[2][:, :, None])
+    looks = found.looks
+    since = looks.stop >= np.unique(looks.stop)[:, None]
+    masks = (run.causes.turned_looks(looks)[:, None] * since).reshape(-1, len(looks))
+    return _masked_test(found, pulled, white, masks, found.linear.jacobians[:, :, 7:8])
 
 
 def _hole_tests(found: Adjusted, pulled: Array, white: Array) -> list[tuple[Array, Places]]:
@@ -103,14 +94,15 @@ def _hole_tests(found: Adjusted, pulled: Array, white: Array) -> list[tuple[Arra
     moved = (since[:, None] & near).reshape(-1, len(looks))
     at_depth = np.concatenate([since, looks.stop == stops[:, None]])
     masks = ((moved, jacobians[:, :, :2]), (at_depth, along))
-    return [_masked_test(found, pulled, white, mask.astype(float), columns) for mask, columns in masks]
+    return [_masked_test(found, pulled, white, mask.astype(np.float64), columns) for mask, columns in masks]
 
 
 def _masked_test(found: Adjusted, pulled: Array, white: Array, masks: Array, columns: Array) -> tuple[Array, Places]:
-    """Of columns (n, 3, q) in the looks that each mask (h, n) lets through."""
+    """Of columns (n, 3, q) of the looks, as much of each as a mask (h, n) says."""
     whole = np.swapaxes(columns, 1, 2) @ found.linear.weights @ columns
     score = np.einsum("ka,kaq->kq", pulled, columns)
-    return _squares(*(np.tensordot(masks, part, axes=1) for part in (score, whole, white @ columns)))
+    parts = ((masks, score), (masks**2, whole), (masks, white @ columns))
+    return _squares(*(np.tensordot(mask, part, axes=1) for mask, part in parts))
 
 
 def late_tests(found: Adjusted) -> list[tuple[Array, Places]]:

@@ -5,10 +5,13 @@ Frame and units as in ``looks``: SI and radians.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+
+from groundstation.survey.adjustment.looks import Looks
 
 Array = npt.NDArray[np.float64]
 JOINT, MOUNT, NORTH = "joint", "mount", "north"
@@ -21,19 +24,24 @@ class TurnCauses:
     Parameters
     ----------
     names : (c,) kind and subject of each: ("joint", tube below it), ("mount", tube), ("north", -1), or others
-    patterns : (c, m) change of the turn of every tube for one radian of each
+    of_tubes, of_make_ups : (c, m) and (c, u), change of the turn of every tube and every make-up for one radian of each
     stds : (c,) rad, of each before the looks
     """
 
     names: tuple[tuple[str, int], ...]
-    patterns: Array
+    of_tubes: Array
+    of_make_ups: Array
     stds: Array
 
     @property
     def cov(self) -> Array:
-        """Covariance (m, m) of the turns, rad^2, as ``StringPrior.turn_cov`` takes it."""
-        columns = self.patterns.T * self.stds
+        """Covariance (m + u, m + u) of the turns, rad^2: ``StringPrior.turn_cov`` but for what has no name."""
+        columns = np.concatenate([self.of_tubes, self.of_make_ups], axis=1).T * self.stds
         return np.asarray(columns @ columns.T)
+
+    def turned_looks(self, looks: Looks) -> Array:
+        """Change (c, n) of the yaw that each look reports for one radian of each."""
+        return np.asarray(self.of_tubes[:, looks.tube] + self.of_make_ups[:, looks.make_up])
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,20 +61,25 @@ class StringRun:
     causes: TurnCauses
 
 
-def chain_causes(from_top: list[int], joint_std: float, mount_std: float, north_std: float) -> TurnCauses:
-    """Causes of a plain chain: each joint turns the tube below it and all further down, each mount its tube, north all.
+def chain_causes(
+    from_bit: Sequence[int], make_up_sizes: Sequence[int], joint_std: float, mount_std: float, north_std: float
+) -> TurnCauses:
+    """Causes of a plain chain that grows on top: a joint turns what lies below it once it is made, a mount its tube.
+
+    The zero of the encoder against north turns all.
 
     Parameters
     ----------
-    from_top : tubes by their places in the string, from the top down; no joint is above the first
+    from_bit : tubes in their order from the bit up
+    make_up_sizes : (u,) how many tubes the string had at each make-up
     joint_std, mount_std, north_std : rad
     """
-    count = len(from_top)
-    below = np.zeros((count, count))
-    for place, tube in enumerate(from_top):
-        below[tube, from_top[place:]] = 1.0
-    joints = [(JOINT, tube) for tube in from_top[1:]]
-    mounts = [(MOUNT, tube) for tube in range(count)]
-    patterns = np.concatenate([below[[tube for _, tube in joints]], np.eye(count), np.ones((1, count))])
+    count, sizes = len(from_bit), np.asarray(make_up_sizes)
+    places = np.argsort(from_bit)
+    joints = np.arange(1, count)[:, None]  # the one below the tube at that place
+    # together, of a look of the tube at place a with b tubes in the string: 1 where a < joint < b
+    of_tubes = [np.where(places >= joints, -1.0, 0.0), np.eye(count), np.ones((1, count))]
+    of_make_ups = [np.where(sizes > joints, 1.0, 0.0), np.zeros((count + 1, len(sizes)))]
+    names = [*((JOINT, tube) for tube in from_bit[:-1]), *((MOUNT, tube) for tube in range(count)), (NORTH, -1)]
     stds = np.array([joint_std] * (count - 1) + [mount_std] * count + [north_std])
-    return TurnCauses((*joints, *mounts, (NORTH, -1)), patterns, stds)
+    return TurnCauses(tuple(names), np.concatenate(of_tubes), np.concatenate(of_make_ups), stds)
