@@ -174,10 +174,7 @@ def all_hypotheses(looks: Looks, run: StringRun) -> Iterator[Hypothesis]:
     of_tubes = {tube: np.unique(looks.stop[looks.tube == tube]).tolist() for tube in np.unique(looks.tube).tolist()}
     for tube, own in of_tubes.items():
         yield from _of_tube(tube, own, onsets)
-    joints = [tube for kind, tube in run.causes.names if kind == JOINT and tube in of_tubes]
-    for tube in joints:
-        yield Hypothesis(K.JOINT_MISREAD, (tube,))
-        yield from (Hypothesis(K.JOINT_SLIPPED, (tube,), stop) for stop in of_tubes[tube][1:] if stop in onsets)
+    yield from _of_joints(looks, run, onsets)
     for one, other in itertools.combinations(of_tubes, 2):
         if np.intersect1d(of_tubes[one], of_tubes[other]).size:
             yield Hypothesis(K.TUBES_EXCHANGED, (one, other))
@@ -212,6 +209,15 @@ def _of_tube(tube: int, own: list[int], onsets: set[int]) -> Iterator[Hypothesis
                 yield Hypothesis(kind, (tube,), stop)
         if place < len(own) - FEWEST_TO_CREEP:
             yield Hypothesis(K.BIAS_CREEPS, (tube,), stop)
+
+
+def _of_joints(looks: Looks, run: StringRun, onsets: set[int]) -> Iterator[Hypothesis]:
+    """A joint may be misread from when it is made on, and slip at any stop after that."""
+    for (kind, tube), turned in zip(run.causes.names, run.causes.turned_looks(looks), strict=True):
+        stops = np.unique(looks.stop[turned != 0.0]).tolist()
+        if kind == JOINT and stops:
+            yield Hypothesis(K.JOINT_MISREAD, (tube,))
+            yield from (Hypothesis(K.JOINT_SLIPPED, (tube,), stop) for stop in stops[1:] if stop in onsets)
 
 
 def _of_hole(looks: Looks, onsets: set[int]) -> Iterator[Hypothesis]:

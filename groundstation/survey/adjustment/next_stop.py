@@ -100,7 +100,8 @@ def _looks_to_come(found: Adjusted, last: Places, length: float, angles: Array) 
         now.play_var, jacobians, weights, np.empty((count, 3)), np.empty(count),
     )  # fmt: skip
     shape = (len(angles), len(last), 3)
-    return jacobians.reshape(*shape, OF_LOOK), np.linalg.inv(weights).reshape(*shape, 3)
+    noise = np.asarray(np.linalg.inv(weights), np.float64)
+    return jacobians.reshape(*shape, OF_LOOK), noise.reshape(*shape, 3)
 
 
 def _covariances(found: Adjusted, last: Places, length: float) -> tuple[Array, float, Array]:

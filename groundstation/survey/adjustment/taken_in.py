@@ -41,7 +41,7 @@ from groundstation.survey.adjustment.string_run import StringRun
 Array = npt.NDArray[np.float64]
 WIDE_FORCE, WIDE_TILT, WIDE_TURN, WIDE_DEPTH = 1.0, 0.2, 3.0, 10.0  # m/s^2, rad, rad, m before a blunder is found
 ROUNDS = 4
-SETTLED = 0.1  # standard deviations of a turn that is taken back
+SETTLED, STRAIGHT = 0.1, 0.01  # standard deviations, and rad or m, of a turn or depth that is found in addition
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +78,8 @@ def adjust_with(
         found = adjust_hole(turned, string, path, extra, replace(now, extra=np.zeros(len(extra.std))))
         cov = found.common_cov[len(found.common_cov) - len(sizes) :, len(found.common_cov) - len(sizes) :]
         before, sizes = sizes, found.now.extra + np.where(is_turn, sizes, 0.0)
-        more = np.abs(sizes - before)[is_turn | is_bent]
-        if np.all(more <= SETTLED * np.sqrt(np.diag(cov))[is_turn | is_bent]):
+        more = np.abs(sizes - before)
+        if np.all((more <= np.minimum(SETTLED * np.sqrt(np.diag(cov)), STRAIGHT))[is_turn | is_bent]):
             break
         now = replace(found.now, extra=np.zeros(0))
         turned = _turned_back(looks, run, sought, sizes)
