@@ -14,12 +14,15 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.config import GroundConfig
+from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import SAME_STOP
 from groundstation.service.hole.resolved_stops import ResolvedStops, Rows
-from groundstation.service.hole.string_prior import Hanging, prior_of_string
+from groundstation.service.hole.string_prior import Hanging, causes_of_turns, prior_of_string
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.blunders import examine_hole
 from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks, PathPrior, StartingPoint, StringPrior
+from groundstation.survey.adjustment.string_run import StringRun
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import Packed, SharedErrors
 from groundstation.survey.fusion.sphere_direction import SphereDirection, tangent_errors
@@ -36,10 +39,12 @@ LOUD = 2.5  # times a tube's noise, from which on a stop is one at which it was 
 
 @dataclass(frozen=True, slots=True)
 class LookedAt:
-    """Looks in the order of time, and what is known of their tubes before."""
+    """Looks in the order of time, what is known of their tubes before, and how the string was run."""
 
     looks: Looks
     string: StringPrior
+    run: StringRun
+    tubes: tuple[str, ...]  # numbers of the tubes by their places
 
 
 class HoleAdjustment:
@@ -55,8 +60,10 @@ class HoleAdjustment:
         self._config, self._shared = config, shared
         self._kept: tuple[bytes, StartingPoint] | None = None  # where an earlier adjustment ended, and of what looks
 
-    def adjust(self, stops: ResolvedStops, station_of_row: Places, mds: Array, collar: Direction) -> Adjusted | None:
-        """Adjust the hole; None where no look counts.
+    def examine(
+        self, stops: ResolvedStops, station_of_row: Places, mds: Array, collar: Direction
+    ) -> ExaminedHole | None:
+        """Adjust the hole and say what is wrong with it; None where no look counts.
 
         Parameters
         ----------
@@ -70,21 +77,29 @@ class HoleAdjustment:
         rows = below[np.lexsort((table["tube"][below], table["at"][below]))]
         if not len(rows):
             return None
-        seen, path = self._looked_at(table[rows], station_of_row[rows]), self.path_of(mds, collar)
-        return adjust_hole(seen.looks, seen.string, path, start=self._start(table[rows], seen, path))
+        path = self.path_of(mds, collar)
+        seen = self._looked_at(table[rows], station_of_row[rows], path.md)
+        start = self._start(table[rows], seen, path)
+        return ExaminedHole(examine_hole(seen.looks, seen.string, path, seen.run, start=start), seen.run, seen.tubes)
 
-    def _looked_at(self, seen: Rows, station: Places) -> LookedAt:
-        """Looks of rows of the table in the order of time, at their stations."""
+    def _looked_at(self, seen: Rows, station: Places, station_md: Array) -> LookedAt:
+        """Looks of rows of the table in the order of time, at their stations (m)."""
         numbers, which = numbered(seen["chain"])
         chains, hanging = [self._shared.chain(number) for number in numbers], Hanging()
         hung = np.array([hanging.add_chain(chain) for chain in chains], np.intp)[which]
         newest = dict(zip(which.tolist(), seen["systematic_var"].tolist(), strict=True))
-        string = prior_of_string(self._config, hanging, chains, [newest[place] for place in range(len(chains))])
+        variances = [newest[place] for place in range(len(chains))]
+        causes = causes_of_turns(hanging, chains, variances, math.radians(self._config.mount_std_deg) ** 2)
         tube_of, make_up = np.ascontiguousarray(hung[:, 0]), np.ascontiguousarray(hung[:, 1])
         unknown = UNKNOWN_YAW_VAR * (seen["trust"] == Trust.UNKNOWN_YAW)
         stop, force = stop_numbers(seen["at"]), np.ascontiguousarray(seen["force"])
         noise, yaw = noise_of(seen, tube_of), seen["yaw"].copy()
-        return LookedAt(Looks(station, tube_of, make_up, stop, force, noise, yaw, seen["yaw_var"] + unknown), string)
+        looks = Looks(station, tube_of, make_up, stop, force, noise, yaw, seen["yaw_var"] + unknown)
+        first = np.searchsorted(stop, np.arange(stop[-1] + 1))
+        deepest = np.maximum.reduceat(station_md[station], first)
+        run = StringRun(deepest, seen["at"][first], station_md, causes)
+        string = prior_of_string(self._config, len(hanging.tubes), causes)
+        return LookedAt(looks, string, run, tuple(str(tube) for _, tube in hanging.tubes))
 
     def path_of(self, mds: Array, collar: Direction) -> PathPrior:
         """What is known of the path before."""
@@ -108,7 +123,7 @@ class HoleAdjustment:
         above = replace(path, md=path.md[np.concatenate([[0], used])])
         made_of = rows[earlier].tobytes() + above.md.tobytes()
         if self._kept is None or self._kept[0] != made_of:
-            part = self._looked_at(rows[earlier], station.astype(np.intp) + 1)
+            part = self._looked_at(rows[earlier], station.astype(np.intp) + 1, above.md)
             self._kept = made_of, adjust_hole(part.looks, part.string, above).now
         return grown_start(self._kept[1], used, len(path.md), seen.string)
 

@@ -16,12 +16,11 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from groundstation.config import GroundConfig
 from groundstation.survey.adjustment.looks import StringPrior
+from groundstation.survey.adjustment.string_run import JOINT, MOUNT, TurnCauses
 
-Array = npt.NDArray[np.float64]
 Chain = tuple[int, tuple[int, ...] | None]  # a tube, and those above it, lowest first, where their order is known
 Joint = tuple[int, ...]
 Hung = tuple[int, int]  # a tube in the string as it was hung at first, or once it was hung otherwise
@@ -29,6 +28,8 @@ GRAVITY_STD = 2e-3  # m/s^2, of what is entered for the site
 LEAST_VAR = 1e-10  # rad^2, of a turn: marks are not read finer
 LEAST_STD = 1e-7  # rad and m/s^2, of what is stated as known
 DRIVE = 0  # above the topmost tube
+DRIVE_HEAD = "drive"  # cause of a turn: the joint of the topmost tube with the drive head
+OF_MOUNT = 2  # numbers in the name of a mount: when, and its tube; that of a joint has another
 
 
 @dataclass(slots=True)
@@ -79,51 +80,56 @@ class Hanging:
         return found
 
 
-def prior_of_string(
-    config: GroundConfig, hanging: Hanging, chains: Sequence[Chain], systematic_vars: Sequence[float]
-) -> StringPrior:
-    """Prior of the tubes that hang so, of which chains have reported these systematic variances (rad^2) last."""
+def prior_of_string(config: GroundConfig, count: int, causes: TurnCauses) -> StringPrior:
+    """Prior of so many tubes, whose turns have these causes."""
     bias = math.radians(config.accelerometer_bias_std_deg) * config.gravity
     tilt = math.radians(config.mount_tilt_std_deg)
-    count = len(hanging.tubes)
-    cov = covariance_of_turns(hanging, chains, systematic_vars, math.radians(config.mount_std_deg) ** 2)
+    cov = causes.cov
     return StringPrior(
         np.full(count, max(bias, LEAST_STD)),
         np.full(count, max(tilt, LEAST_STD)),
         np.zeros(len(cov)),
-        cov,
+        cov + LEAST_VAR * np.eye(len(cov)),
         config.gravity,
         GRAVITY_STD,
         math.radians(config.play_std_deg),
     )
 
 
-def covariance_of_turns(
+def causes_of_turns(
     hanging: Hanging, chains: Sequence[Chain], systematic_vars: Sequence[float], mount_var: float
-) -> Array:
-    """Covariance (m + u, m + u), rad^2, of the turns of tubes and of make-ups."""
+) -> TurnCauses:
+    """Causes of the turns of tubes that hang so, of which chains have reported these variances (rad^2) last."""
     own = dict(zip(chains, systematic_vars, strict=True))
-    joints: dict[Joint, float] = {}
     totals = {chain: max(total - mount_var, 0.0) for chain, total in own.items()}
+    joints: dict[Joint, float] = {}
     for chain in chains:
         joints |= joint_variances(chain, totals)
     mounts = {chain[0]: min(mount_var, total) for chain, total in own.items()}
     rows = [mounted(hanging, hung) for hung in hanging.tubes] + [made_up(hanging, hung) for hung in hanging.make_ups]
     names = list(dict.fromkeys(name for row in rows for name, _ in row))
     place = {name: number for number, name in enumerate(names)}
-    stds = [math.sqrt(mounts[name[1]] if len(name) == 2 else joints[name[1:]]) for name in names]
-    columns = np.zeros((len(rows), len(names)))
-    for row, parts in zip(columns, rows, strict=True):
+    columns = np.zeros((len(names), len(rows)))
+    for number, parts in enumerate(rows):
         for name, sign in parts:
-            row[place[name]] += sign * stds[place[name]]
-    return np.asarray(columns @ columns.T + LEAST_VAR * np.eye(len(rows)))
+            columns[place[name], number] += sign
+    stds = np.sqrt([mounts[name[1]] if len(name) == OF_MOUNT else joints[name[1:]] for name in names])
+    count = len(hanging.tubes)
+    return TurnCauses(tuple(named(hanging, name) for name in names), columns[:, :count], columns[:, count:], stds)
+
+
+def named(hanging: Hanging, name: Joint) -> tuple[str, int]:
+    """Kind of a cause and the place of its tube: of a joint the one below it."""
+    time, tube = name[:2]
+    kind = MOUNT if len(name) == OF_MOUNT else (DRIVE_HEAD if name[-1] == DRIVE else JOINT)
+    return kind, hanging.tubes.get((time, tube), -1)
 
 
 def mounted(hanging: Hanging, hung: Hung) -> list[tuple[Joint, float]]:
     """Errors in the turn of a tube, with their signs: its mount, less the joints below it."""
-    time, tube = hung
+    time, _ = hung
     below = [hung, *hanging.joints_below(hung)]
-    return [((time, tube), 1.0), *(((time, lower[1], upper[1]), -1.0) for upper, lower in pairwise(below))]
+    return [(hung, 1.0), *(((time, lower[1], upper[1]), -1.0) for upper, lower in pairwise(below))]
 
 
 def made_up(hanging: Hanging, hung: Hung) -> list[tuple[Joint, float]]:

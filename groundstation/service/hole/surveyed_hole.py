@@ -16,11 +16,11 @@ import numpy.typing as npt
 
 from groundstation.config import GroundConfig
 from groundstation.service.hole.deviation_alarms import AlarmList
+from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import History
 from groundstation.service.hole.hole_adjustment import HoleAdjustment, directions_of
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
-from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import SharedErrors
@@ -49,7 +49,7 @@ class SurveyedHole:
         self._station_of: list[SurveyStation] = []  # of each of its rows
         self._stations: list[SurveyStation] = []
         self._adjustment = HoleAdjustment(config, shared)
-        self._adjusted: Adjusted | None = None
+        self._examined: ExaminedHole | None = None
         self._directions: dict[float, Direction] = {}  # by the depth (m) of a station below the collar
         self._alarms = AlarmList()
         self._history = History()
@@ -107,10 +107,10 @@ class SurveyedHole:
         return bool(np.any((self._stops.column("tube") == tube) & (self._stops.column("md") > 0.0)))
 
     @property
-    def adjusted(self) -> Adjusted | None:
-        """The hole as it was adjusted; None before the first look at a station."""
+    def examined(self) -> ExaminedHole | None:
+        """The hole as it was adjusted, and what is wrong with it; None before the first look at a station."""
         self.settle()
-        return self._adjusted
+        return self._examined
 
     @property
     def alarms(self) -> AlarmList:
@@ -183,8 +183,8 @@ class SurveyedHole:
         place = {id(one): number for number, one in enumerate(below, 1)}
         station_of_row = np.array([place.get(id(one), 0) for one in self._station_of], np.intp)
         collar = self._config.collar
-        self._adjusted = self._adjustment.adjust(self._stops, station_of_row, np.array(mds), collar)
-        found: list[Direction] = [] if self._adjusted is None else [*directions_of(self._adjusted, self._shared)]
+        examined = self._examined = self._adjustment.examine(self._stops, station_of_row, np.array(mds), collar)
+        found: list[Direction] = [] if examined is None else [*directions_of(examined.adjusted, self._shared)]
         if self._config.weighting is not Weighting.ADJUSTED:
             found = [one.fused(self._config.weighting) for one in below]
         if self.has_transport and found:
