@@ -18,9 +18,9 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, Hypothesis, all_hypotheses
 from groundstation.survey.adjustment.looks import Looks, PathPrior, StartingPoint, StringPrior
+from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.scores import Score, log_chances, log_tail, score_hypotheses
 from groundstation.survey.adjustment.screen import is_suspicious
-from groundstation.survey.adjustment.string_run import StringRun
 from groundstation.survey.adjustment.taken_in import TakenIn, adjust_with, deviance_of
 
 Array = npt.NDArray[np.float64]
@@ -99,7 +99,7 @@ def examine_hole(
     looks: Looks,
     string: StringPrior,
     path: PathPrior,
-    run: StringRun,
+    run: RunOfStops,
     known: Sequence[Blunder] = (),
     start: StartingPoint | None = None,
 ) -> Examination:
@@ -131,7 +131,7 @@ def find_blunder(
     looks: Looks,
     string: StringPrior,
     path: PathPrior,
-    run: StringRun,
+    run: RunOfStops,
     now: TakenIn,
     known: tuple[Hypothesis, ...] = (),
 ) -> Blunder | None:
@@ -158,7 +158,7 @@ def find_blunder(
     return Blunder(best, second, global_ratio(found), global_ratio(with_best.found))
 
 
-def chance_of_one(looks: Looks, run: StringRun) -> float:
+def chance_of_one(looks: Looks, run: RunOfStops) -> float:
     """Chance of a false alarm that one hypothesis has at the last stop, so that a whole hole keeps its own."""
     return FALSE_ALARM * math.exp(-log_of_stops(looks)) / max(1, sum(1 for _ in all_hypotheses(looks, run)))
 
@@ -188,7 +188,7 @@ def _tried(
     looks: Looks,
     string: StringPrior,
     path: PathPrior,
-    run: StringRun,
+    run: RunOfStops,
     found: Adjusted,
     known: tuple[Hypothesis, ...],
     one: Hypothesis,
@@ -207,7 +207,7 @@ def _explained(with_one: TakenIn, found: Adjusted, one: Hypothesis, many: float)
 
 
 def _judged_again(
-    looks: Looks, string: StringPrior, path: PathPrior, run: StringRun, known: Sequence[Blunder], place: int
+    looks: Looks, string: StringPrior, path: PathPrior, run: RunOfStops, known: Sequence[Blunder], place: int
 ) -> Blunder:
     """A blunder that was a doubt, by what later looks tell of it."""
     blunder = known[place]

@@ -14,7 +14,7 @@ from scipy.stats import chi2, ncx2
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunders import chance_of_one
-from groundstation.survey.adjustment.budget import ErrorSource, error_budget, toe_budget
+from groundstation.survey.adjustment.budget import ShareSource, error_budget, toe_budget
 from groundstation.survey.adjustment.hypotheses import BlunderKind, Hypothesis, all_hypotheses
 from groundstation.survey.adjustment.looks import Looks
 from groundstation.survey.adjustment.next_stop import plan_stop
@@ -73,7 +73,7 @@ def test_shares_add_up_with_a_blunder_taken_in_and_looks_that_count_less(drawn: 
     whole = np.einsum("kar,kar->r", states[:, :2], toe_weights(found))
     shares = toe_budget(found, drawn.run.causes)
     np.testing.assert_allclose(sum(one.variances for one in shares), whole, rtol=1e-10)
-    assert sum(one.source is ErrorSource.BLUNDER for one in shares) == 3
+    assert sum(one.source is ShareSource.BLUNDER for one in shares) == 3
 
 
 def test_shares_are_those_of_the_dense_estimator(
