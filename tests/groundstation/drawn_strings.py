@@ -45,7 +45,7 @@ class DrawnString:
     string: StringPrior
     path: PathPrior
     run: RunOfStops
-    tangents: Array  # (s + 1, 3)
+    tangents: Array  # (s + 1, 3) of the hole as it is in the end
     tube: int  # the one that is wrong
     other: int  # and the one it changed places with
     onset: int
@@ -120,6 +120,8 @@ def draw_string(
                 force += way * size * MG
             rows.append((station, one, stop, force, told))
     stations, tubes, stops, forces, yaws = (np.array(part) for part in zip(*rows, strict=True))
+    if kind == "hole_moved":
+        tangents[first_moved : first_moved + 3, :2] += size * DEG * across
     looks = Looks(
         stations, tubes, stops, stops, forces, np.full(len(rows), 2e-4**2), yaws, np.full(len(rows), (0.02 * DEG) ** 2)
     )

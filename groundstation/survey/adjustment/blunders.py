@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,7 @@ Array = npt.NDArray[np.float64]
 FALSE_ALARM = 1e-3  # of a whole honest hole
 WORTH_TRYING = math.log(1e-3)  # of one hypothesis, before it is tried
 MOST_TRIED = 8
+AS_GOOD = 0.3  # part of the best's logarithm that is worth trying; play hides the rest
 PARTED = math.log(100.0)  # by how much the best outdoes the second, or it is a doubt
 MOST_BLUNDERS = 4
 
@@ -120,7 +121,15 @@ def examine_hole(
             break
         found.append(blunder)
         now = adjust_with(looks, string, path, run, _taken_in(found), now.found.now)
-    return Examination(now.found, tuple(found))
+    return Examination(now.found, tuple(_resized(one, now, _taken_in(found)) for one in found))
+
+
+def _resized(blunder: Blunder, now: TakenIn, taken_in: tuple[Hypothesis, ...]) -> Blunder:
+    """A blunder with its size as all looks and the other blunders have it now; a doubt keeps those of its trials."""
+    if blunder.is_doubt:
+        return blunder
+    place = taken_in.index(blunder.best.hypothesis)
+    return replace(blunder, best=replace(blunder.best, size=now.sizes[place], cov=now.covs[place]))
 
 
 def _taken_in(blunders: Sequence[Blunder]) -> tuple[Hypothesis, ...]:
@@ -178,7 +187,8 @@ def best_of_kinds(scores: Sequence[Score], found: Adjusted) -> list[Hypothesis]:
             one = score.hypotheses[place]
             about = (one.kind, one.subject)
             best[about] = min(best.get(about, (0.0, one)), (float(chances[place]), one), key=lambda pair: pair[0])
-    ordered = [one for _, one in sorted(best.values(), key=lambda pair: pair[0])]
+    ranked = sorted(best.values(), key=lambda pair: pair[0])
+    ordered = [one for chance, one in ranked if chance <= AS_GOOD * ranked[0][0]]
     first_of_kind = {one.kind: one for one in reversed(ordered)}
     leading = [one for one in ordered if one is first_of_kind[one.kind] or one in ordered[:3]]
     return leading[:MOST_TRIED]

@@ -136,8 +136,11 @@ def exchanged_stations(looks: Looks, tubes: tuple[int, ...]) -> Places:
 
 
 def effect_amplitudes(one: Hypothesis, looks: Looks, run: RunOfStops) -> Array:
-    """How much (n,) of a hypothesis is in each look; 0 in those that it leaves alone."""
-    amount: Array | float = 1.0
+    """How much (n,) of a hypothesis is in each look; 0 in those that it leaves alone.
+
+    Where the hole moved it is the looks before that are off, so that the directions are those of the hole as it is.
+    """
+    amount: Array | float = -1.0 if one.kind is K.HOLE_MOVED else 1.0
     if one.kind in OF_CHAIN:
         amount = _turned_by(one, looks, run)
     elif one.kind is K.BIAS_CREEPS:
@@ -151,7 +154,7 @@ def _is_touched(one: Hypothesis, looks: Looks) -> npt.NDArray[np.bool_]:
     if one.kind is K.TUBES_EXCHANGED:
         return np.asarray(exchanged_stations(looks, one.subject) != looks.station)
     if one.kind is K.HOLE_MOVED:
-        return np.asarray(since & (looks.station >= one.subject[0]) & (looks.station <= one.subject[1]))
+        return np.asarray(~since & (looks.station >= one.subject[0]) & (looks.station <= one.subject[1]))
     if one.kind in (K.DEPTH_WRONG_ONCE, K.LOOK_WRONG):
         since = looks.stop == one.stop
     if one.kind in (*OF_CHAIN, *BY_DEPTH):

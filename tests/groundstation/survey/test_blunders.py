@@ -62,7 +62,7 @@ def dense_effect(one: Hypothesis, dense: DenseHole, drawn: DrawnString) -> Array
     touched = looks.stop >= one.stop
     tube = one.subject[0] if one.subject else -1
     if one.kind is K.HOLE_MOVED:
-        touched &= (looks.station >= one.subject[0]) & (looks.station <= one.subject[1])
+        touched = ~touched & (looks.station >= one.subject[0]) & (looks.station <= one.subject[1])
         columns = np.stack([rows[k, :, 4 * s : 4 * s + 2] for k, s in enumerate(looks.station)])
     elif one.kind in (K.JOINT_SLIPPED, K.JOINT_MISREAD):
         touched &= (looks.tube <= tube) & (looks.stop > tube)
@@ -122,9 +122,8 @@ def test_scores_of_honest_holes_are_chi_square() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", SIZES)
-@pytest.mark.parametrize("place", [1, 2])
-def test_a_blunder_is_named_or_told_as_a_doubt(kind: str, place: int) -> None:
-    size = SIZES[kind][min(place, len(SIZES[kind]) - 1)]
+def test_a_blunder_is_named_or_told_as_a_doubt(kind: str) -> None:
+    size = SIZES[kind][min(1, len(SIZES[kind]) - 1)]
     found = [(verdict(examined(drawn), kind, drawn), drawn) for drawn in (draw_string(s, kind, size) for s in range(3))]
     assert {one for one, _ in found} <= {"named", "doubt"}
 
@@ -132,9 +131,9 @@ def test_a_blunder_is_named_or_told_as_a_doubt(kind: str, place: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["bias_stepped", "joint_misread", "axes_exchanged", "hole_moved", "look_wrong"])
 def test_the_toe_is_honest_once_a_gross_blunder_is_taken_in(kind: str) -> None:
-    drawn = [draw_string(seed, kind, SIZES[kind][-1]) for seed in range(8)]
+    drawn = [draw_string(seed, kind, SIZES[kind][-1]) for seed in range(4)]
     squares = [toe_departure(examined(one), one) for one in drawn]
-    assert sum(squares) < 39.25  # one in a thousand of chi-square with 16 degrees of freedom
+    assert sum(squares) < 26.12  # one in a thousand of chi-square with 8 degrees of freedom
 
 
 def test_a_step_is_told_with_its_size_and_from_which_stop_on() -> None:
