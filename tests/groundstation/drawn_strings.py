@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.looks import Looks, PathPrior, StringPrior
-from groundstation.survey.adjustment.string_run import StringRun, chain_causes
+from groundstation.survey.adjustment.run_of_stops import RunOfStops, chain_causes
 
 Array = npt.NDArray[np.float64]
 DEG = math.pi / 180.0
@@ -44,8 +44,8 @@ class DrawnString:
     looks: Looks
     string: StringPrior
     path: PathPrior
-    run: StringRun
-    tangents: Array  # (s + 1, 3)
+    run: RunOfStops
+    tangents: Array  # (s + 1, 3) of the hole as it is in the end
     tube: int  # the one that is wrong
     other: int  # and the one it changed places with
     onset: int
@@ -120,6 +120,8 @@ def draw_string(
                 force += way * size * MG
             rows.append((station, one, stop, force, told))
     stations, tubes, stops, forces, yaws = (np.array(part) for part in zip(*rows, strict=True))
+    if kind == "hole_moved":
+        tangents[first_moved : first_moved + 3, :2] += size * DEG * across
     looks = Looks(
         stations, tubes, stops, stops, forces, np.full(len(rows), 2e-4**2), yaws, np.full(len(rows), (0.02 * DEG) ** 2)
     )
@@ -134,7 +136,7 @@ def draw_string(
         play_deg * DEG,
     )
     path = PathPrior(md, np.array([0.0, 0.0, 1.0]), np.diag([1.0, 1.0, 0.0]) * (0.5 * DEG) ** 2, 0.15 * DEG, 20.0)
-    run = StringRun(md[1:], np.arange(count) * HOUR, md, causes)
+    run = RunOfStops(md[1:], np.arange(count) * HOUR, md, causes)
     return DrawnString(looks, string, path, run, tangents, tube, other, onset)
 
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from groundstation.survey.adjustment.blunders import Blunder, Explanation
 from groundstation.survey.adjustment.hypotheses import BY_DEPTH, OF_FORCE, BlunderKind
-from groundstation.survey.adjustment.string_run import StringRun
+from groundstation.survey.adjustment.run_of_stops import RunOfStops
 
 Array = npt.NDArray[np.float64]
 STANDARD_GRAVITY = 9.80665
@@ -36,7 +36,7 @@ SENTENCES: Mapping[BlunderKind, str] = {
 }
 
 
-def say_blunder(blunder: Blunder, run: StringRun, tubes: Sequence[str]) -> str:
+def say_blunder(blunder: Blunder, run: RunOfStops, tubes: Sequence[str]) -> str:
     """A blunder as a sentence; of a doubt both explanations.
 
     Parameters
@@ -50,7 +50,7 @@ def say_blunder(blunder: Blunder, run: StringRun, tubes: Sequence[str]) -> str:
     return f"{best}, or {say_explanation(blunder.second, run, tubes)}: the readings do not tell which"
 
 
-def say_explanation(one: Explanation, run: StringRun, tubes: Sequence[str]) -> str:
+def say_explanation(one: Explanation, run: RunOfStops, tubes: Sequence[str]) -> str:
     """One explanation as a sentence."""
     kind, subject = one.hypothesis.kind, one.hypothesis.subject
     words = {"size": say_size(one), "depth": f"{run.md[one.hypothesis.stop]:.1f} m"}

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -18,15 +18,16 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, Hypothesis, all_hypotheses
 from groundstation.survey.adjustment.looks import Looks, PathPrior, StartingPoint, StringPrior
+from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.scores import Score, log_chances, log_tail, score_hypotheses
 from groundstation.survey.adjustment.screen import is_suspicious
-from groundstation.survey.adjustment.string_run import StringRun
 from groundstation.survey.adjustment.taken_in import TakenIn, adjust_with, deviance_of
 
 Array = npt.NDArray[np.float64]
 FALSE_ALARM = 1e-3  # of a whole honest hole
 WORTH_TRYING = math.log(1e-3)  # of one hypothesis, before it is tried
 MOST_TRIED = 8
+AS_GOOD = 0.3  # part of the best's logarithm that is worth trying; play hides the rest
 PARTED = math.log(100.0)  # by how much the best outdoes the second, or it is a doubt
 MOST_BLUNDERS = 4
 
@@ -99,7 +100,7 @@ def examine_hole(
     looks: Looks,
     string: StringPrior,
     path: PathPrior,
-    run: StringRun,
+    run: RunOfStops,
     known: Sequence[Blunder] = (),
     start: StartingPoint | None = None,
 ) -> Examination:
@@ -120,7 +121,15 @@ def examine_hole(
             break
         found.append(blunder)
         now = adjust_with(looks, string, path, run, _taken_in(found), now.found.now)
-    return Examination(now.found, tuple(found))
+    return Examination(now.found, tuple(_resized(one, now, _taken_in(found)) for one in found))
+
+
+def _resized(blunder: Blunder, now: TakenIn, taken_in: tuple[Hypothesis, ...]) -> Blunder:
+    """A blunder with its size as all looks and the other blunders have it now; a doubt keeps those of its trials."""
+    if blunder.is_doubt:
+        return blunder
+    place = taken_in.index(blunder.best.hypothesis)
+    return replace(blunder, best=replace(blunder.best, size=now.sizes[place], cov=now.covs[place]))
 
 
 def _taken_in(blunders: Sequence[Blunder]) -> tuple[Hypothesis, ...]:
@@ -131,7 +140,7 @@ def find_blunder(
     looks: Looks,
     string: StringPrior,
     path: PathPrior,
-    run: StringRun,
+    run: RunOfStops,
     now: TakenIn,
     known: tuple[Hypothesis, ...] = (),
 ) -> Blunder | None:
@@ -158,7 +167,7 @@ def find_blunder(
     return Blunder(best, second, global_ratio(found), global_ratio(with_best.found))
 
 
-def chance_of_one(looks: Looks, run: StringRun) -> float:
+def chance_of_one(looks: Looks, run: RunOfStops) -> float:
     """Chance of a false alarm that one hypothesis has at the last stop, so that a whole hole keeps its own."""
     return FALSE_ALARM * math.exp(-log_of_stops(looks)) / max(1, sum(1 for _ in all_hypotheses(looks, run)))
 
@@ -178,7 +187,8 @@ def best_of_kinds(scores: Sequence[Score], found: Adjusted) -> list[Hypothesis]:
             one = score.hypotheses[place]
             about = (one.kind, one.subject)
             best[about] = min(best.get(about, (0.0, one)), (float(chances[place]), one), key=lambda pair: pair[0])
-    ordered = [one for _, one in sorted(best.values(), key=lambda pair: pair[0])]
+    ranked = sorted(best.values(), key=lambda pair: pair[0])
+    ordered = [one for chance, one in ranked if chance <= AS_GOOD * ranked[0][0]]
     first_of_kind = {one.kind: one for one in reversed(ordered)}
     leading = [one for one in ordered if one is first_of_kind[one.kind] or one in ordered[:3]]
     return leading[:MOST_TRIED]
@@ -188,7 +198,7 @@ def _tried(
     looks: Looks,
     string: StringPrior,
     path: PathPrior,
-    run: StringRun,
+    run: RunOfStops,
     found: Adjusted,
     known: tuple[Hypothesis, ...],
     one: Hypothesis,
@@ -207,7 +217,7 @@ def _explained(with_one: TakenIn, found: Adjusted, one: Hypothesis, many: float)
 
 
 def _judged_again(
-    looks: Looks, string: StringPrior, path: PathPrior, run: StringRun, known: Sequence[Blunder], place: int
+    looks: Looks, string: StringPrior, path: PathPrior, run: RunOfStops, known: Sequence[Blunder], place: int
 ) -> Blunder:
     """A blunder that was a doubt, by what later looks tell of it."""
     blunder = known[place]

@@ -17,13 +17,13 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.equations import KNOWN, path_equations, turn_places
 from groundstation.survey.adjustment.looks import BIAS, OF_TUBE, TILT
-from groundstation.survey.adjustment.string_run import TurnCauses
+from groundstation.survey.adjustment.run_of_stops import TurnCauses
 from groundstation.survey.adjustment.toe_weights import moved_looks, toe_weights
 
 Array = npt.NDArray[np.float64]
 
 
-class ErrorSource(StrEnum):
+class ShareSource(StrEnum):
     """Where an error at the toe comes from."""
 
     FORCE_NOISE = auto()
@@ -49,7 +49,7 @@ class ErrorShare:
     variances : (r,) of each functional; of the toe m^2 to north, east and down
     """
 
-    source: ErrorSource
+    source: ShareSource
     subject: int
     variances: Array
 
@@ -76,17 +76,17 @@ def error_budget(found: Adjusted, weights: Array, causes: TurnCauses) -> list[Er
     collar, path = _of_path(found, states)
     return [
         *_of_looks(found, moved_looks(found, states, common)),
-        *_by_tube(ErrorSource.BIAS, np.sum(tubes[:, BIAS] ** 2, axis=1) / found.string.bias_std[:, None] ** 2),
-        *_by_tube(ErrorSource.TILT, np.sum(tubes[:, TILT] ** 2, axis=1) / found.string.tilt_std[:, None] ** 2),
+        *_by_tube(ShareSource.BIAS, np.sum(tubes[:, BIAS] ** 2, axis=1) / found.string.bias_std[:, None] ** 2),
+        *_by_tube(ShareSource.TILT, np.sum(tubes[:, TILT] ** 2, axis=1) / found.string.tilt_std[:, None] ** 2),
         *_of_turns(found, common[turn_places(found.string)], causes),
-        ErrorShare(ErrorSource.GRAVITY, -1, gravity),
-        ErrorShare(ErrorSource.COLLAR, -1, collar),
-        ErrorShare(ErrorSource.PATH, -1, path),
-        *_by_tube(ErrorSource.BLUNDER, further),
+        ErrorShare(ShareSource.GRAVITY, -1, gravity),
+        ErrorShare(ShareSource.COLLAR, -1, collar),
+        ErrorShare(ShareSource.PATH, -1, path),
+        *_by_tube(ShareSource.BLUNDER, further),
     ]
 
 
-def _by_tube(source: ErrorSource, variances: Array) -> list[ErrorShare]:
+def _by_tube(source: ShareSource, variances: Array) -> list[ErrorShare]:
     return [ErrorShare(source, subject, one) for subject, one in enumerate(variances)]
 
 
@@ -104,7 +104,7 @@ def _of_looks(found: Adjusted, moved: Array) -> list[ErrorShare]:
     ])  # fmt: skip
     total = parts.sum(axis=0)
     shares = np.sum(parts * np.where(total > 0.0, whole / np.where(total > 0.0, total, 1.0), 0.0), axis=1)
-    sources = (ErrorSource.FORCE_NOISE, ErrorSource.PLAY, ErrorSource.YAW_NOISE)
+    sources = (ShareSource.FORCE_NOISE, ShareSource.PLAY, ShareSource.YAW_NOISE)
     return [ErrorShare(source, -1, one) for source, one in zip(sources, shares, strict=True)]
 
 
@@ -114,7 +114,7 @@ def _of_turns(found: Adjusted, turns: Array, causes: TurnCauses) -> list[ErrorSh
     patterns = np.concatenate([causes.of_tubes, causes.of_make_ups], axis=1)
     named = (causes.stds[:, None] * (patterns @ weighed)) ** 2
     rest = np.sum(weighed * turns, axis=0) - named.sum(axis=0)
-    return [*_by_tube(ErrorSource.TURN, named), ErrorShare(ErrorSource.TURN, -1, rest)]
+    return [*_by_tube(ShareSource.TURN, named), ErrorShare(ShareSource.TURN, -1, rest)]
 
 
 def _of_path(found: Adjusted, states: Array) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Linearised
 from groundstation.survey.adjustment.looks import Looks, StartingPoint
-from groundstation.survey.adjustment.string_run import JOINT, StringRun
+from groundstation.survey.adjustment.run_of_stops import JOINT, RunOfStops
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
@@ -81,14 +81,14 @@ class Hypothesis:
 
 
 def effect_of(
-    one: Hypothesis, looks: Looks, run: StringRun, now: StartingPoint, linear: Linearised, reach: float = 0.0
+    one: Hypothesis, looks: Looks, run: RunOfStops, now: StartingPoint, linear: Linearised, reach: float = 0.0
 ) -> tuple[Places, Array]:
     """Looks (r,) that a hypothesis changes, and the change (r, 3, q) of their force for one unit of it.
 
     Units are m/s^2 (a second, of a creep), rad, m, or one for what has a known size. Of a depth that is wrong by about
     ``reach`` (m) it is the mean change over that length.
     """
-    amplitude = amplitudes(one, looks, run)
+    amplitude = effect_amplitudes(one, looks, run)
     rows = np.flatnonzero(amplitude)
     by = linear.jacobians[rows]
     if one.kind in OF_FORCE:
@@ -135,9 +135,12 @@ def exchanged_stations(looks: Looks, tubes: tuple[int, ...]) -> Places:
     return found if len(both) else looks.station
 
 
-def amplitudes(one: Hypothesis, looks: Looks, run: StringRun) -> Array:
-    """How much (n,) of a hypothesis is in each look; 0 in those that it leaves alone."""
-    amount: Array | float = 1.0
+def effect_amplitudes(one: Hypothesis, looks: Looks, run: RunOfStops) -> Array:
+    """How much (n,) of a hypothesis is in each look; 0 in those that it leaves alone.
+
+    Where the hole moved it is the looks before that are off, so that the directions are those of the hole as it is.
+    """
+    amount: Array | float = -1.0 if one.kind is K.HOLE_MOVED else 1.0
     if one.kind in OF_CHAIN:
         amount = _turned_by(one, looks, run)
     elif one.kind is K.BIAS_CREEPS:
@@ -151,7 +154,7 @@ def _is_touched(one: Hypothesis, looks: Looks) -> npt.NDArray[np.bool_]:
     if one.kind is K.TUBES_EXCHANGED:
         return np.asarray(exchanged_stations(looks, one.subject) != looks.station)
     if one.kind is K.HOLE_MOVED:
-        return np.asarray(since & (looks.station >= one.subject[0]) & (looks.station <= one.subject[1]))
+        return np.asarray(~since & (looks.station >= one.subject[0]) & (looks.station <= one.subject[1]))
     if one.kind in (K.DEPTH_WRONG_ONCE, K.LOOK_WRONG):
         since = looks.stop == one.stop
     if one.kind in (*OF_CHAIN, *BY_DEPTH):
@@ -159,14 +162,14 @@ def _is_touched(one: Hypothesis, looks: Looks) -> npt.NDArray[np.bool_]:
     return np.asarray(since & (looks.tube == one.subject[0]))
 
 
-def _turned_by(one: Hypothesis, looks: Looks, run: StringRun) -> Array:
+def _turned_by(one: Hypothesis, looks: Looks, run: RunOfStops) -> Array:
     """Turn (n,) of the yaw of every look for one radian of a joint or of the encoder."""
     if one.kind is K.ENCODER_SLIPPED:
         return np.ones(len(looks))
     return np.asarray(run.causes.turned_looks(looks)[run.causes.names.index((JOINT, one.subject[0]))])
 
 
-def all_hypotheses(looks: Looks, run: StringRun) -> Iterator[Hypothesis]:
+def all_hypotheses(looks: Looks, run: RunOfStops) -> Iterator[Hypothesis]:
     """Everything single that the looks of a hole could show; from the latest stops on where there are many."""
     stops = np.unique(looks.stop).tolist()
     onsets = set(thinned_stops(stops))
@@ -211,7 +214,7 @@ def _of_tube(tube: int, own: list[int], onsets: set[int]) -> Iterator[Hypothesis
             yield Hypothesis(K.BIAS_CREEPS, (tube,), stop)
 
 
-def _of_joints(looks: Looks, run: StringRun, onsets: set[int]) -> Iterator[Hypothesis]:
+def _of_joints(looks: Looks, run: RunOfStops, onsets: set[int]) -> Iterator[Hypothesis]:
     """A joint may be misread from when it is made on, and slip at any stop after that."""
     for (kind, tube), turned in zip(run.causes.names, run.causes.turned_looks(looks), strict=True):
         stops = np.unique(looks.stop[turned != 0.0]).tolist()

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.kernels.observations import linearise_looks
 from groundstation.survey.adjustment.kernels.path_elimination import reduce_right
-from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks
+from groundstation.survey.adjustment.looks import BIAS, OF_TUBE, TILT, TURN, Looks
 from groundstation.survey.adjustment.sphere import step_directions
 from groundstation.survey.adjustment.toe_weights import toe_weights
 from groundstation.survey.path.curvature_process import process_step
@@ -85,14 +85,17 @@ def _looks_to_come(found: Adjusted, last: Places, length: float, angles: Array) 
     looks, now = found.looks, found.now
     count = len(last) * len(angles)
     tangents = np.concatenate([now.tangents, _ahead(found, length)[0][None]])
-    bases = np.concatenate([found.linear.bases, found.linear.bases[-1:]])
+    across = found.linear.bases[-1] - np.outer(found.linear.bases[-1] @ tangents[-1], tangents[-1])
+    bases = np.concatenate([found.linear.bases, across[None]])  # their length is off by the square of a bend
     yaw = (looks.yaw[last] + angles[:, None]).ravel()
     tube, station = (np.tile(one, len(angles)) for one in (looks.tube[last], looks.station[last] + 1))
     make_up = np.tile(looks.make_up[last], len(angles))
     psi = yaw - now.tubes[tube, TURN] - now.make_ups[make_up]
     d = tangents[station]
     lean = (d[:, 0] + 1j * d[:, 1]) * np.exp(-1j * psi)
-    force = now.gravity * np.stack([lean.real, lean.imag, -d[:, 2]], axis=1) + now.tubes[tube, :3]
+    axes = np.stack([lean.real, lean.imag, -d[:, 2]], axis=1)
+    tilt = np.concatenate([now.tubes[tube, TILT], np.zeros((count, 1))], axis=1)
+    force = now.gravity * (axes + np.cross(tilt, axes)) + now.tubes[tube, BIAS]  # as told, so no yaw error is seen
     jacobians, weights = np.empty((count, 3, OF_LOOK)), np.empty((count, 3, 3))
     force_var, yaw_var = (np.tile(one[last], len(angles)) for one in (looks.force_var, looks.yaw_var))
     linearise_looks(

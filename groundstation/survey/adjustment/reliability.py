@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, BlunderKind, Hypothesis, effect_of
+from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.scores import UNTOLD, free_information
-from groundstation.survey.adjustment.string_run import StringRun
 from groundstation.survey.adjustment.toe_weights import moved_looks
 
 Array = npt.NDArray[np.float64]
@@ -58,7 +58,7 @@ def least_noncentrality(width: int, chance: float = FALSE_ALARM_OF_ONE, power: f
 
 def measure_reliability(
     found: Adjusted,
-    run: StringRun,
+    run: RunOfStops,
     hypotheses: Iterable[Hypothesis],
     weights: Array,
     sizes: Mapping[BlunderKind, float],
@@ -87,7 +87,7 @@ def moved_by_functional(found: Adjusted, weights: Array) -> Array:
 
 def _of_one(
     found: Adjusted,
-    run: StringRun,
+    run: RunOfStops,
     one: Hypothesis,
     moved: Array,
     sizes: Mapping[BlunderKind, float],

@@ -18,7 +18,7 @@ from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.hypotheses import WIDTHS, Hypothesis, effect_of
 from groundstation.survey.adjustment.kernels.path_elimination import reduce_right
 from groundstation.survey.adjustment.looks import OF_TUBE
-from groundstation.survey.adjustment.string_run import StringRun
+from groundstation.survey.adjustment.run_of_stops import RunOfStops
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
@@ -47,7 +47,7 @@ class Score:
     squares: Array
 
 
-def score_hypotheses(found: Adjusted, run: StringRun, hypotheses: Iterable[Hypothesis]) -> list[Score]:
+def score_hypotheses(found: Adjusted, run: RunOfStops, hypotheses: Iterable[Hypothesis]) -> list[Score]:
     """Score hypotheses, those of one width together."""
     by_width = sorted(hypotheses, key=lambda one: WIDTHS[one.kind])
     scores = []
@@ -58,7 +58,7 @@ def score_hypotheses(found: Adjusted, run: StringRun, hypotheses: Iterable[Hypot
     return scores
 
 
-def _score_part(found: Adjusted, run: StringRun, part: Sequence[Hypothesis]) -> Score:
+def _score_part(found: Adjusted, run: RunOfStops, part: Sequence[Hypothesis]) -> Score:
     width = WIDTHS[part[0].kind]
     columns = np.zeros((len(found.looks), 3, len(part), width))
     touched = np.zeros(len(found.looks), bool)

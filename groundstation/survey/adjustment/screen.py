@@ -15,8 +15,8 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.equations import string_departure, turn_places
 from groundstation.survey.adjustment.looks import BIAS, OF_TUBE, TILT
+from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.scores import best_sizes, log_chances, whitened_effects
-from groundstation.survey.adjustment.string_run import StringRun
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
@@ -27,13 +27,13 @@ LEAST_TOLD = 1e-6  # part of a variance
 MOST_WHOLE = 150  # looks up to which the screen is exact
 
 
-def is_suspicious(found: Adjusted, run: StringRun) -> bool:
+def is_suspicious(found: Adjusted, run: RunOfStops) -> bool:
     """Whether a hole is worth asking what is wrong with it; where tubes seem to lie far more askew than told, it is."""
     too_large = found.now.play_var > PLAY_TOO_LARGE * found.string.play_std**2
     return bool(too_large or least_chance(found, run) < math.log(SUSPICIOUS))
 
 
-def least_chance(found: Adjusted, run: StringRun) -> float:
+def least_chance(found: Adjusted, run: RunOfStops) -> float:
     """Logarithm of the chance, at most, that an honest hole has any test as unlikely as the worst here."""
     is_whole = len(found.looks) <= MOST_WHOLE
     tests = [against_prior(found), *(whole_tests(found, run) if is_whole else late_tests(found))]
@@ -56,7 +56,7 @@ def against_prior(found: Adjusted) -> tuple[Array, Places]:
     return np.where(is_told, off * off / np.where(is_told, free, 1.0), 0.0), is_told.astype(np.intp)
 
 
-def whole_tests(found: Adjusted, run: StringRun) -> list[tuple[Array, Places]]:
+def whole_tests(found: Adjusted, run: RunOfStops) -> list[tuple[Array, Places]]:
     """Squares and their degrees of freedom of every look, every tube and every chain of tubes from a stop on."""
     count = len(found.looks)
     blocks = np.zeros((count, 3, count, 3))
@@ -75,7 +75,7 @@ def _squares(pulled: Array, whole: Array, white: Array) -> tuple[Array, Places]:
     return squares, told
 
 
-def _turn_test(found: Adjusted, run: StringRun, pulled: Array, white: Array) -> tuple[Array, Places]:
+def _turn_test(found: Adjusted, run: RunOfStops, pulled: Array, white: Array) -> tuple[Array, Places]:
     """Of every cause of turns from every stop on."""
     looks = found.looks
     since = looks.stop >= np.unique(looks.stop)[:, None]

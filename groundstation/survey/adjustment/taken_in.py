@@ -27,16 +27,16 @@ from groundstation.survey.adjustment.hypotheses import (
     WIDTHS,
     BlunderKind,
     Hypothesis,
-    amplitudes,
+    effect_amplitudes,
     effect_of,
     exchanged_stations,
 )
 from groundstation.survey.adjustment.kernels.path_elimination import eliminate_path
 from groundstation.survey.adjustment.looks import FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.play import PLAY_KNOWN_AS
+from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.sphere import carried_bases
 from groundstation.survey.adjustment.starting_point import first_start
-from groundstation.survey.adjustment.string_run import StringRun
 
 Array = npt.NDArray[np.float64]
 WIDE_FORCE, WIDE_TILT, WIDE_TURN, WIDE_DEPTH = 1.0, 0.2, 3.0, 10.0  # m/s^2, rad, rad, m before a blunder is found
@@ -63,7 +63,7 @@ def adjust_with(
     looks: Looks,
     string: StringPrior,
     path: PathPrior,
-    run: StringRun,
+    run: RunOfStops,
     blunders: Sequence[Hypothesis],
     start: StartingPoint | None = None,
 ) -> TakenIn:
@@ -109,16 +109,16 @@ def put_right(looks: Looks, blunders: Sequence[Hypothesis]) -> Looks:
     return looks
 
 
-def _turned_back(looks: Looks, run: StringRun, sought: Sequence[Hypothesis], sizes: Array) -> Looks:
+def _turned_back(looks: Looks, run: RunOfStops, sought: Sequence[Hypothesis], sizes: Array) -> Looks:
     turn = np.zeros(len(looks))
     for one, at in zip(sought, _places(sought), strict=True):
         if one.kind in BY_TURN:
-            turn += amplitudes(one, looks, run) * sizes[at.start]
+            turn += effect_amplitudes(one, looks, run) * sizes[at.start]
     return replace(looks, yaw=looks.yaw - turn)
 
 
 def further_effects(
-    looks: Looks, run: StringRun, sought: Sequence[Hypothesis], now: StartingPoint, sizes: Array
+    looks: Looks, run: RunOfStops, sought: Sequence[Hypothesis], now: StartingPoint, sizes: Array
 ) -> FurtherEffects:
     """Blunders of unknown size, about ``sizes``, as further unknowns of an adjustment that begins at ``now``."""
     if not sought:
@@ -135,10 +135,10 @@ def further_effects(
     return FurtherEffects(columns, stds)
 
 
-def wide_std(one: Hypothesis, looks: Looks, run: StringRun) -> float:
+def wide_std(one: Hypothesis, looks: Looks, run: RunOfStops) -> float:
     """Standard deviation of a blunder before it is found: wide enough to leave it to the looks."""
     if one.kind is BlunderKind.BIAS_CREEPS:
-        return WIDE_FORCE / max(float(np.max(amplitudes(one, looks, run), initial=0.0)), 1e-9)
+        return WIDE_FORCE / max(float(np.max(effect_amplitudes(one, looks, run), initial=0.0)), 1e-9)
     if one.kind in OF_FORCE:
         return WIDE_FORCE
     if one.kind in BY_TURN:

@@ -8,59 +8,28 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
-from dense_hole import DenseHole
+from blame_table import examined, examined_as_it_grows, toe_departure, verdict
+from dense_hole import DenseHole, walk
 from drawn_strings import DEG, MG, SIZES, DrawnString, draw_string
 
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.blunder_words import SENTENCES, say_blunder
-from groundstation.survey.adjustment.blunders import Blunder, Examination, examine_hole
+from groundstation.survey.adjustment.blunders import examine_hole
 from groundstation.survey.adjustment.hypotheses import (
     OF_FORCE,
     BlunderKind,
     Hypothesis,
     all_hypotheses,
-    amplitudes,
+    effect_amplitudes,
     thinned_stops,
 )
 from groundstation.survey.adjustment.scores import score_hypotheses
 from groundstation.survey.adjustment.screen import is_suspicious
-from groundstation.survey.adjustment.taken_in import adjust_with
+from groundstation.survey.adjustment.taken_in import adjust_with, deviance_of
 
 Array = npt.NDArray[np.float64]
 K = BlunderKind
 NAMES = [str(tube + 1) for tube in range(10)]
-OF_ONE_TUBE = (K.DEPTH_WRONG_ONCE, K.DEPTH_WRONG_FROM, K.ENCODER_SLIPPED, K.HOLE_MOVED)
-
-
-def examined(drawn: DrawnString) -> Examination:
-    return examine_hole(drawn.looks, drawn.string, drawn.path, drawn.run)
-
-
-def is_right(one: Hypothesis, kind: str, drawn: DrawnString) -> bool:
-    if one.kind != kind:
-        return False
-    if kind == K.TUBES_EXCHANGED:
-        return set(one.subject) == {drawn.tube, drawn.other}
-    return one.kind in OF_ONE_TUBE or one.subject == (drawn.tube,)
-
-
-def verdict(found: Examination, kind: str, drawn: DrawnString) -> str:
-    if not found.blunders:
-        return "missed"
-    first = found.blunders[0]
-    if is_right(first.best.hypothesis, kind, drawn):
-        return "doubt" if first.is_doubt else "named"
-    is_second = first.is_doubt and first.second is not None and is_right(first.second.hypothesis, kind, drawn)
-    return "doubt" if is_second else "wrong"
-
-
-def toe_departure(found: Examination, drawn: DrawnString) -> float:
-    """Square of the toe's error by its covariance, of two degrees of freedom."""
-    adjusted = found.adjusted
-    errors = np.einsum("kai,ki->ka", adjusted.linear.bases, drawn.tangents - adjusted.now.tangents)[1:]
-    shared = adjusted.columns[1:, :2].sum(axis=0)
-    off, cov = errors.sum(axis=0), shared @ shared.T + adjusted.own_covs[1:, :2, :2].sum(axis=0)
-    return float(off @ np.linalg.solve(cov, off))
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +37,9 @@ def honest() -> DrawnString:
     return draw_string(7)
 
 
-@pytest.mark.parametrize("kind", [k for k in BlunderKind if k not in (K.TUBES_EXCHANGED, *OF_ONE_TUBE[:2])])
+@pytest.mark.parametrize(
+    "kind", [k for k in BlunderKind if k not in (K.TUBES_EXCHANGED, K.DEPTH_WRONG_ONCE, K.DEPTH_WRONG_FROM)]
+)
 def test_a_score_is_that_of_dense_matrices(honest: DrawnString, kind: BlunderKind) -> None:
     looks = honest.looks
     found = adjust_hole(looks, honest.string, honest.path)
@@ -91,7 +62,7 @@ def dense_effect(one: Hypothesis, dense: DenseHole, drawn: DrawnString) -> Array
     touched = looks.stop >= one.stop
     tube = one.subject[0] if one.subject else -1
     if one.kind is K.HOLE_MOVED:
-        touched &= (looks.station >= one.subject[0]) & (looks.station <= one.subject[1])
+        touched = ~touched & (looks.station >= one.subject[0]) & (looks.station <= one.subject[1])
         columns = np.stack([rows[k, :, 4 * s : 4 * s + 2] for k, s in enumerate(looks.station)])
     elif one.kind in (K.JOINT_SLIPPED, K.JOINT_MISREAD):
         touched &= (looks.tube <= tube) & (looks.stop > tube)
@@ -115,6 +86,27 @@ def dense_effect(one: Hypothesis, dense: DenseHole, drawn: DrawnString) -> Array
     return np.asarray((columns * (touched * hours)[:, None, None]).reshape(3 * len(looks), -1))
 
 
+def test_the_likelihood_is_that_of_dense_matrices(honest: DrawnString) -> None:
+    found = adjust_hole(honest.looks, honest.string, honest.path)
+    dense, now = DenseHole(found), found.now
+    sizes = [np.linalg.slogdet(one)[1] for one in (np.linalg.inv(dense.cov), dense.prior, dense.W)]
+    # how far the unknowns stand off what was known of them; the path by the bends between its stations
+    off = np.zeros(dense.width)
+    off[dense.states :] = np.concatenate([now.tubes.ravel(), [now.gravity - 9.81], now.make_ups])
+    squares = found.left.ravel() @ dense.W @ found.left.ravel()
+    squares += off[dense.states :] @ dense.prior[dense.states :, dense.states :] @ off[dense.states :]
+    across = found.linear.bases
+    collar = across[0] @ (now.tangents[0] - honest.path.collar)
+    squares += collar @ collar / (0.5 * DEG) ** 2 + np.sum(now.curvatures[0] ** 2) / (0.15 * DEG) ** 2
+    for k in range(10):
+        go, spread = walk(2.0, 20.0, 0.15 * DEG)
+        bend = across[k] @ (now.tangents[k + 1] - now.tangents[k])
+        step = np.stack([bend, now.curvatures[k + 1]]) - go @ np.stack([np.zeros(2), now.curvatures[k]])
+        squares += np.trace(step.T @ np.linalg.solve(spread, step))
+    play = 4.0 * (np.log(now.play_var) + (0.01 * DEG) ** 2 / now.play_var)
+    assert deviance_of(found) == pytest.approx(squares + sizes[0] - sizes[1] - sizes[2] + play, abs=0.1)
+
+
 def test_scores_of_honest_holes_are_chi_square() -> None:
     squares: dict[BlunderKind, list[float]] = {}
     for seed in range(12):
@@ -130,9 +122,8 @@ def test_scores_of_honest_holes_are_chi_square() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", SIZES)
-@pytest.mark.parametrize("place", [1, 2])
-def test_a_blunder_is_named_or_told_as_a_doubt(kind: str, place: int) -> None:
-    size = SIZES[kind][min(place, len(SIZES[kind]) - 1)]
+def test_a_blunder_is_named_or_told_as_a_doubt(kind: str) -> None:
+    size = SIZES[kind][min(1, len(SIZES[kind]) - 1)]
     found = [(verdict(examined(drawn), kind, drawn), drawn) for drawn in (draw_string(s, kind, size) for s in range(3))]
     assert {one for one, _ in found} <= {"named", "doubt"}
 
@@ -140,11 +131,9 @@ def test_a_blunder_is_named_or_told_as_a_doubt(kind: str, place: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["bias_stepped", "joint_misread", "axes_exchanged", "hole_moved", "look_wrong"])
 def test_the_toe_is_honest_once_a_gross_blunder_is_taken_in(kind: str) -> None:
-    drawn = [draw_string(seed, kind, SIZES[kind][-1]) for seed in range(8)]
+    drawn = [draw_string(seed, kind, SIZES[kind][-1]) for seed in range(4)]
     squares = [toe_departure(examined(one), one) for one in drawn]
-    assert sum(squares) < 39.25  # one in a thousand of chi-square with 16 degrees of freedom
-    plain = [Examination(adjust_hole(one.looks, one.string, one.path)) for one in drawn]
-    assert np.median([toe_departure(a, b) for a, b in zip(plain, drawn, strict=True)]) < 50.0 or kind != "look_wrong"
+    assert sum(squares) < 26.12  # one in a thousand of chi-square with 8 degrees of freedom
 
 
 def test_a_step_is_told_with_its_size_and_from_which_stop_on() -> None:
@@ -215,30 +204,21 @@ def test_a_blunder_that_was_put_in_comes_out_linearly(honest: DrawnString) -> No
 
 
 def test_false_blame_of_honest_holes_that_grow() -> None:
-    """At every stop of a few holes; a thousand holes are in the study of blunders."""
-    for seed in range(6):
-        drawn = draw_string(200 + seed)
-        known: tuple[Blunder, ...] = ()
-        for last in range(10):
-            seen = drawn.looks.stop <= last
-            looks = replace(drawn.looks, **{n: getattr(drawn.looks, n)[seen] for n in drawn.looks.__dataclass_fields__})
-            path = replace(drawn.path, md=drawn.path.md[: last + 2])
-            run = replace(drawn.run, station_md=path.md)
-            known = examine_hole(looks, drawn.string, path, run, known).blunders
-        assert not known
+    """At every stop of a few holes; ``blame_table.py`` does a thousand."""
+    assert not any(examined_as_it_grows(draw_string(200 + seed)) for seed in range(6))
 
 
 def test_every_kind_has_a_width_a_sentence_and_a_hypothesis(honest: DrawnString) -> None:
     hypotheses = list(all_hypotheses(honest.looks, honest.run))
     assert len(set(hypotheses)) == len(hypotheses)
     assert {one.kind for one in hypotheses} == set(BlunderKind) == set(SENTENCES)
-    assert all(np.any(amplitudes(one, honest.looks, honest.run)) for one in hypotheses)
+    assert all(np.any(effect_amplitudes(one, honest.looks, honest.run)) for one in hypotheses)
 
 
 def test_no_two_hypotheses_of_a_kind_are_one(honest: DrawnString) -> None:
     for kind, some in itertools.groupby(all_hypotheses(honest.looks, honest.run), key=lambda one: one.kind):
         if kind in OF_FORCE:
-            rows = [tuple(amplitudes(one, honest.looks, honest.run)) for one in some]
+            rows = [tuple(effect_amplitudes(one, honest.looks, honest.run)) for one in some]
             assert len(set(rows)) == len(rows)
 
 

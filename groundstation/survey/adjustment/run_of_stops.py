@@ -45,7 +45,7 @@ class TurnCauses:
 
 
 @dataclass(frozen=True, slots=True)
-class StringRun:
+class RunOfStops:
     """How a string was run.
 
     Parameters
