@@ -43,7 +43,7 @@ class GroundConfig(BaseModel):
     collar_azimuth_deg: float = 0.0
     collar_std_deg: float = Field(0.0, ge=0.0, description="of the direction at the collar, each way")
     weighting: Weighting = Field(
-        Weighting.ADJUSTED, description="all readings of the hole in one, or those of each station by a scheme"
+        Weighting.BAYES, description="how the readings of one station count, or all of the hole in one adjustment"
     )
     mount_tilt_std_deg: float = Field(0.5, ge=0.0, description="of an IMU against its tube's axis; aligned, 0.01")
     play_std_deg: Positive = Field(0.01, description="of a tube against the hole at a stop, until the looks tell it")

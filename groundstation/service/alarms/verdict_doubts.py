@@ -57,7 +57,7 @@ def _doubts_of_surveys(
 
 def _contradictions(hole: SurveyedHole) -> Iterator[tuple[VerdictDoubt, str]]:
     """What is wrong with the hole and may be one thing or another."""
-    if hole.examined is not None:
+    if hole.is_adjusted and hole.examined is not None:
         for sentence in hole.examined.doubts:
             yield VerdictDoubt.CONTRADICTION, sentence
 

@@ -97,7 +97,7 @@ class Watch:
 
     def _look_at_hole(self) -> None:
         """Tell what is wrong with the hole by its surveys, and what is not any more."""
-        examined = self._hole.examined
+        examined = self._hole.examined if self._hole.is_adjusted else None
         blunders = {} if examined is None else examined.by_subject
         for subject in self._blamed - blunders.keys():
             self._alarms.clear("blunder", subject)

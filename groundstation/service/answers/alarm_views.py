@@ -13,18 +13,20 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.shapes.alarm_shapes import (
     Alarm,
     AlarmsAnswer,
+    MovedStation,
     RigAlarmRow,
     ToleranceAlarmRow,
 )
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.hole.deviation_alarms import DeviationAlarm
+from groundstation.service.hole.movement import Moved
 from groundstation.survey.wall.column_deviation import LEVELS
 
 
 @view_of(AlarmsAnswer)
 def answer_alarms(k: RigModel, _p: Parameters) -> AlarmsAnswer:
-    """What the crew works with; deviations and alarms of the rig, standing or cleared."""
-    crew, deviations, rig = k.crew_alarms, k.hole.alarms, k.rig_alarms
+    """What the crew works with; deviations and alarms of the rig, standing or cleared; where the hole moved."""
+    crew, deviations, moved, rig = k.crew_alarms, k.hole.alarms, k.hole.moved, k.rig_alarms
     return AlarmsAnswer(
         open=[crew_alarm_row(crew, alarm) for alarm in crew],
         closed=[crew_alarm_row(crew, alarm) for alarm in crew.cleared],
@@ -34,8 +36,20 @@ def answer_alarms(k: RigModel, _p: Parameters) -> AlarmsAnswer:
         levels_percent=[round(100.0 * level) for level in LEVELS],
         active=[tolerance_alarm_row(alarm) for alarm in deviations.active],
         cleared=[tolerance_alarm_row(alarm) for alarm in deviations.alarms if alarm.cleared_at is not None],
+        moved=[moved_station(one) for one in moved],
         rig=[rig_alarm_row(alarm) for alarm in rig],
         rig_cleared=[rig_alarm_row(alarm) for alarm in rig.cleared],
+    )
+
+
+def moved_station(m: Moved) -> MovedStation:
+    """A station where the hole moved."""
+    return MovedStation(
+        md_m=round(m.md, 6),
+        at_s=m.at,
+        dropped_measurements=m.dropped,
+        departure_sigma=m.evidence.own,
+        neighbours_sigma=list(m.evidence.neighbours),
     )
 
 

@@ -54,14 +54,20 @@ def answer_station(k: RigModel, n: int) -> Station:
 
 
 def station_rows(k: RigModel, numbers: Sequence[int]) -> list[Station]:
-    """Stations of these numbers as they are in the hole that was adjusted."""
+    """Stations of these numbers, fused; those to which nothing has come since they were shown last are as they were.
+
+    What a string turns by in a bent hole changes with the stations around.
+    """
     known, hole = k.hole.stations, k.hole
     chosen, drawn = [known[n - 1] for n in numbers], hole.trajectory
+    changed = chosen if hole.has_transport else [s for s in chosen if s.shown is None]
+    for s, values in zip(changed, direction_values(hole, changed), strict=True):
+        s.show(values)
     places = [hole.place_of(s) for s in chosen]
     positions = position_values(drawn.positions[places], drawn.covs[places])
-    rows = zip(numbers, chosen, direction_values(hole, chosen), positions, strict=True)
+    rows = zip(numbers, chosen, positions, strict=True)
     return filled_answers(
-        Station, ({"station": n, "md_m": round(s.md, 6)} | direction | position for n, s, direction, position in rows)
+        Station, ({"station": n, "md_m": round(s.md, 6)} | (s.shown or {}) | position for n, s, position in rows)
     )
 
 
@@ -91,6 +97,7 @@ def direction_value(
         "transport_deg": math.degrees(transport[0]),
         "sigma_transport_deg": math.degrees(transport[1]),
         "measurements": s.count,
+        "dropped_measurements": s.first,
         "untrusted_measurements": s.untrusted,
     } | typical_reading(s)
 

@@ -11,16 +11,16 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunder_words import say_blunder
 from groundstation.survey.adjustment.blunders import Blunder, Examination, chance_of_one
-from groundstation.survey.adjustment.budget import ErrorShare, ErrorSource, toe_budget
+from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, toe_budget
 from groundstation.survey.adjustment.hypotheses import BlunderKind, Hypothesis
 from groundstation.survey.adjustment.next_stop import NextStop, plan_stop
 from groundstation.survey.adjustment.reliability import Reliability, measure_reliability
-from groundstation.survey.adjustment.string_run import StringRun
+from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.toe_weights import toe_weights
 
 Array = npt.NDArray[np.float64]
 LEVEL = 2  # of north, east and down those across a hole
-OF_TUBE = (ErrorSource.BIAS, ErrorSource.TILT)
+OF_TUBE = (ShareSource.BIAS, ShareSource.TILT)
 LARGEST_STEP = 0.2  # m/s^2, by which an accelerometer that was knocked may step: 20 mg
 STEP = BlunderKind.BIAS_STEPPED
 
@@ -37,7 +37,7 @@ class ExaminedHole:
     """
 
     examination: Examination
-    run: StringRun
+    run: RunOfStops
     tubes: tuple[str, ...]
 
     @property
@@ -77,7 +77,7 @@ class ExaminedHole:
 
     def share_name(self, share: ErrorShare) -> tuple[str, str]:
         """Source of a share, and the tube or joint that it is of."""
-        if share.source is ErrorSource.TURN and share.subject >= 0:
+        if share.source is ShareSource.TURN and share.subject >= 0:
             kind, place = self.run.causes.names[share.subject]
             return kind, f"tube {self.tubes[place]}" if place >= 0 else ""
         is_of_tube = share.source in OF_TUBE and share.subject >= 0

@@ -22,7 +22,7 @@ from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunders import examine_hole
 from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks, PathPrior, StartingPoint, StringPrior
-from groundstation.survey.adjustment.string_run import StringRun
+from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import Packed, SharedErrors
 from groundstation.survey.fusion.sphere_direction import SphereDirection, tangent_errors
@@ -43,7 +43,7 @@ class LookedAt:
 
     looks: Looks
     string: StringPrior
-    run: StringRun
+    run: RunOfStops
     tubes: tuple[str, ...]  # numbers of the tubes by their places
 
 
@@ -97,7 +97,7 @@ class HoleAdjustment:
         looks = Looks(station, tube_of, make_up, stop, force, noise, yaw, seen["yaw_var"] + unknown)
         first = np.searchsorted(stop, np.arange(stop[-1] + 1))
         deepest = np.maximum.reduceat(station_md[station], first)
-        run = StringRun(deepest, seen["at"][first], station_md, causes)
+        run = RunOfStops(deepest, seen["at"][first], station_md, causes)
         string = prior_of_string(self._config, len(hanging.tubes), causes)
         return LookedAt(looks, string, run, tuple(str(tube) for _, tube in hanging.tubes))
 

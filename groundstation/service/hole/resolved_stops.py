@@ -39,6 +39,8 @@ ROW: Final = np.dtype(
         ("cov", np.float64, (2, 2)),
         ("information", np.float64, (2, 2)),
         ("causes", np.float64, (2, CAUSES)),
+        ("departed", np.float64, 2),
+        ("departure", np.float64),
     ]
 )
 
@@ -124,7 +126,7 @@ class ResolvedStops:
         rows["information"] = weights_of(rows["cov"], rows["causes"], self.places, int(rows["width"].max()))
 
     def append_stop(self, other: ResolvedStops, row: int) -> int:
-        """Add a stop of another table; returns its row."""
+        """Add a stop of another table, from which no departure is known yet; returns its row."""
         own, known = len(self.forces), self.rows
         if own == len(known):
             self.rows = np.empty(own + own // GROWTH, ROW)

@@ -77,7 +77,7 @@ class Resolver:
         rows, by_force, by_yaw = stops.rows, np.empty((len(measurements), 2, AXES)), np.empty((len(measurements), 2))
         for name, values in zip(COLUMNS, zip(*map(sent_of, measurements), strict=True), strict=True):
             rows[name] = values
-        rows["replaces"] = NO_NUMBER
+        rows["replaces"], rows["departed"], rows["departure"] = NO_NUMBER, 0.0, np.nan
         alike: dict[int, list[int]] = defaultdict(list)
         for row, m in enumerate(measurements):
             rows["trust"][row] = trust_of(m.flags)

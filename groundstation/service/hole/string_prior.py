@@ -19,7 +19,7 @@ import numpy as np
 
 from groundstation.config import GroundConfig
 from groundstation.survey.adjustment.looks import StringPrior
-from groundstation.survey.adjustment.string_run import JOINT, MOUNT, TurnCauses
+from groundstation.survey.adjustment.run_of_stops import JOINT, MOUNT, TurnCauses
 
 Chain = tuple[int, tuple[int, ...] | None]  # a tube, and those above it, lowest first, where their order is known
 Joint = tuple[int, ...]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, insort
+from collections.abc import Sequence
 from operator import attrgetter
 
 import numpy as np
@@ -19,6 +20,7 @@ from groundstation.service.hole.deviation_alarms import AlarmList
 from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import History
 from groundstation.service.hole.hole_adjustment import HoleAdjustment, directions_of
+from groundstation.service.hole.movement import Moved, Movement
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
 from groundstation.survey.fusion.fusion import Weighting
@@ -47,17 +49,19 @@ class SurveyedHole:
         self._design = config.design
         self._stops = ResolvedStops()
         self._station_of: list[SurveyStation] = []  # of each of its rows
+        self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
         self._stations: list[SurveyStation] = []
+        self._movement = Movement(self._stops, self._station_of)
         self._adjustment = HoleAdjustment(config, shared)
-        self._examined: ExaminedHole | None = None
-        self._directions: dict[float, Direction] = {}  # by the depth (m) of a station below the collar
+        self._examined: tuple[int, ExaminedHole | None] = (0, None)  # of the version that it is of
+        self._adjusted: dict[float, Direction] = {}  # by the depth (m) of a station, where the hole is adjusted
         self._alarms = AlarmList()
         self._history = History()
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
         self._trajectory = Trajectory(collar=config.collar, keeps_columns=False)
         self._deviations = self._deviate()
         self._projection: Deviation | None = None
-        self._is_settled = True  # whether all that came is in what follows from it
+        self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
         self._newest_at = -math.inf  # s, rig time of the newest survey
         self.version = 0  # grows with every survey
         self.newest = 0  # number of the measurement that came last, revisions included
@@ -82,7 +86,8 @@ class SurveyedHole:
         self.version += 1
         self.newest += 1
         self._history.on_survey(epoch, at)
-        self._is_settled = False
+        self._touched[station.md] = station
+        self._unsettled_since = min(self._unsettled_since, at)
         self._newest_at = max(self._newest_at, at)
         return True
 
@@ -107,10 +112,10 @@ class SurveyedHole:
         return bool(np.any((self._stops.column("tube") == tube) & (self._stops.column("md") > 0.0)))
 
     @property
-    def examined(self) -> ExaminedHole | None:
-        """The hole as it was adjusted, and what is wrong with it; None before the first look at a station."""
+    def moved(self) -> list[Moved]:
+        """Where the hole moved."""
         self.settle()
-        return self._examined
+        return self._movement.moved
 
     @property
     def alarms(self) -> AlarmList:
@@ -132,7 +137,39 @@ class SurveyedHole:
     def direction_of(self, station: SurveyStation) -> Direction:
         """Direction of the hole at a station, the transport of the string in it."""
         self.settle()
-        return self._directions.get(station.md, self._config.collar)
+        carried = self._carried.get(station.md)
+        return self._found(station) if carried is None else carried.direction
+
+    @property
+    def is_adjusted(self) -> bool:
+        """Whether all readings of the hole are adjusted in one, and not fused station by station."""
+        return self._config.weighting is Weighting.ADJUSTED
+
+    @property
+    def examined(self) -> ExaminedHole | None:
+        """The hole adjusted in one, and what is wrong with it; None before the first look at a station.
+
+        Where the stations are fused one by one it stands beside them, and is worked out when it is asked for.
+        """
+        if self._examined[0] != self.version:
+            below = self._below
+            place = {id(one): number for number, one in enumerate(below, 1)}
+            station_of_row = np.array([place.get(id(one), 0) for one in self._station_of], np.intp)
+            mds = np.array([one.md for one in below])
+            found = self._adjustment.examine(self._stops, station_of_row, mds, self._config.collar)
+            self._examined = self.version, found
+        return self._examined[1]
+
+    @property
+    def _below(self) -> list[SurveyStation]:
+        """Stations below the collar."""
+        return [station for station in self._stations if station.md > 0.0]
+
+    def _found(self, station: SurveyStation) -> Direction:
+        """Direction of a station without transport; that of the collar is the collar's where the hole is adjusted."""
+        if not self.is_adjusted:
+            return station.fused(self._config.weighting)
+        return self._adjusted.get(station.md, self._config.collar)
 
     @property
     def has_transport(self) -> bool:
@@ -171,30 +208,29 @@ class SurveyedHole:
 
     def settle(self) -> None:
         """Work out what follows from the stops that have come since the last time."""
-        is_settled, self._is_settled = self._is_settled, True
-        if not is_settled:
-            self._adjust()
-            self._work_out()
+        since, self._unsettled_since = self._unsettled_since, math.inf
+        if since < math.inf:
+            self._work_out(self._adjust() if self.is_adjusted else self._fuse(since))
 
-    def _adjust(self) -> None:
-        """Adjust the hole to all looks that there are."""
-        below = [one for one in self._stations if one.md > 0.0]
-        mds = [one.md for one in below]
-        place = {id(one): number for number, one in enumerate(below, 1)}
-        station_of_row = np.array([place.get(id(one), 0) for one in self._station_of], np.intp)
-        collar = self._config.collar
-        examined = self._examined = self._adjustment.examine(self._stops, station_of_row, np.array(mds), collar)
-        found: list[Direction] = [] if examined is None else [*directions_of(examined.adjusted, self._shared)]
-        if self._config.weighting is not Weighting.ADJUSTED:
-            found = [one.fused(self._config.weighting) for one in below]
-        if self.has_transport and found:
-            places = self._shared.transport_places(len(found) + 1)
-            self._carried = dict(zip(mds, carry_directions(collar, found, places), strict=True))
-            found = [carried.direction for carried in self._carried.values()]
-        self._directions = dict(zip(mds, found, strict=True))
+    def _adjust(self) -> list[SurveyStation]:
+        """Adjust the hole; all of its stations have changed."""
+        self._touched, examined = {}, self.examined
+        found = [] if examined is None else directions_of(examined.adjusted, self._shared)
+        self._adjusted = dict(zip([one.md for one in self._below], found, strict=True))
+        return self._below
 
-    def _work_out(self) -> None:
-        self._trajectory.put(self._directions.items())
+    def _fuse(self, since: float) -> list[SurveyStation]:
+        """Fuse the stations of which something may have changed since a time (s), together those with one more stop."""
+        by_depth = self._touched | self._movement.judge_since(since)
+        changed, self._touched = [by_depth[md] for md in sorted(by_depth)], {}
+        weighting = self._config.weighting
+        if weighting is Weighting.BAYES and (grown := [station for station in changed if station.lacks_newest]):
+            newest = self._stops.stack([station.stops.rows[-1] for station in grown])
+            SurveyStation.add_newest(grown, newest)
+        return changed
+
+    def _work_out(self, changed: Sequence[SurveyStation]) -> None:
+        self._trajectory.put(self._directions(changed))
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)
         if worst is None:
@@ -202,6 +238,22 @@ class SurveyedHole:
         self._projection = project_to_target(self._trajectory[-1], self.direction_of(self._stations[-1]), self._design)
         self._alarms.judge_deviation("deviation", worst, self._newest_at)
         self._alarms.judge_deviation("projection", self._projection, self._newest_at)
+
+    def _directions(self, changed: Sequence[SurveyStation]) -> list[tuple[float, Direction]]:
+        """Stations in the hole (m, direction) that may be others than before.
+
+        Where the string turns in a bent hole these are all: what it turns by is that of the stations above, and of the
+        one below too.
+        """
+        if not self.has_transport:
+            return [(one.md, self._found(one)) for one in changed if one.md > 0.0]
+        measured = [(one.md, self._found(one)) for one in self._below]
+        if not measured:
+            return []
+        mds, directions = zip(*measured, strict=True)
+        places = self._shared.transport_places(len(measured) + 1)
+        self._carried = dict(zip(mds, carry_directions(self._config.collar, directions, places), strict=True))
+        return [(md, carried.direction) for md, carried in self._carried.items()]
 
     def _deviate(self) -> Deviations:
         """Deviations of the trajectory as it is drawn."""

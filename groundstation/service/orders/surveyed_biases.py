@@ -2,28 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import math
+from collections.abc import Collection, Iterator, Mapping
 
+import numpy as np
+
+from groundstation.config import SENSOR_BIAS_DEG, GroundConfig
 from groundstation.service.hole.surveyed_hole import SurveyedHole
-from groundstation.survey.adjustment.tube_biases import SurveyedBiases, bias_of_tube
+from groundstation.survey.fusion.force_biases import Look, SurveyedBiases, look_of, solve_biases
+from groundstation.survey.fusion.survey_trust import Trust
 from telemetry.messages import NodeState
 
+GRAVITY_STD = 2e-3  # m/s^2, of what is entered for the site
 
-def surveyed_biases(hole: SurveyedHole, states: Mapping[int, NodeState], mixed: Collection[int]) -> SurveyedBiases:
-    """What all surveys tell; those of tubes that get no block help to know the stations.
+
+def surveyed_biases(
+    config: GroundConfig, hole: SurveyedHole, states: Mapping[int, NodeState], mixed: Collection[int]
+) -> SurveyedBiases:
+    """What all surveys that count tell; those of tubes that get no block help to know the stations.
 
     Parameters
     ----------
     states : newest of each tube
     mixed : tubes whose block was replaced after a survey of the hole
     """
-    examined = hole.examined
-    places = {} if examined is None else {int(tube): place for place, tube in enumerate(examined.tubes)}
-    refused = {tube: reason for tube in places if (reason := _why_not(hole, tube, states.get(tube), mixed))}
-    if examined is None:
-        return SurveyedBiases({}, refused)
-    found = {t: bias_of_tube(examined.adjusted, place) for t, place in sorted(places.items()) if t not in refused}
-    return SurveyedBiases(found, refused)
+    bias_std = math.radians(max(config.accelerometer_bias_std_deg, SENSOR_BIAS_DEG)) * config.gravity
+    looks = list(_looks_of_hole(hole, config.gravity))
+    found = solve_biases(looks, bias_std, GRAVITY_STD)
+    refused = {tube: reason for tube in found if (reason := _why_not(hole, tube, states.get(tube), mixed))}
+    return SurveyedBiases({tube: one for tube, one in found.items() if tube not in refused}, refused)
+
+
+def _looks_of_hole(hole: SurveyedHole, gravity: float) -> Iterator[Look]:
+    for station in hole.stations:
+        if station.md <= 0.0:
+            continue  # at the collar tubes may be anywhere
+        for place, stop in enumerate(station.stops):
+            if stop.trust is not Trust.FULL:
+                continue
+            where = station.md, station.first_before(place + 1)  # before and after it moved these are two
+            force = np.mean(np.array(stop.forces), axis=0)
+            var, yaw = stop.force_var, stop.yaw
+            yield look_of(where, stop.tube, stop, (stop.causes, stop.places), force, var, yaw, gravity)
 
 
 def _why_not(hole: SurveyedHole, tube: int, state: NodeState | None, mixed: Collection[int]) -> str:

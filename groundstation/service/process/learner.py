@@ -36,8 +36,8 @@ class Learner:
         self._string, self._hole, self._placement = model.string, model.hole, model.placement
         self._orders, self._recalibration = model.orders, model.recalibration
         self._arrived: list[Stored[Kept]] = []  # since the last transaction
-        # alarms of the hole and stops of the string that were told
-        self._known: tuple[list[DeviationAlarm], int] = ([], 0)
+        # alarms of the hole, moves and stops of the string that were told
+        self._known: tuple[list[DeviationAlarm], int, int] = ([], 0, 0)
         self._by_survey = CHANGED_BY_SURVEY if model.wall is None else (*CHANGED_BY_SURVEY, "wall")
 
     def take(self, message: Kept) -> None:
@@ -113,8 +113,8 @@ class Learner:
         Measurements come one by one, tube by tube: to be asked at every look, and not for each of them.
         """
         hole = self._hole
-        before, self._known = self._known, (list(hole.alarms.alarms), hole.history.count)
-        paths = {"alarms": before[0] != self._known[0], "history": before[1] != self._known[1]}
+        before, self._known = self._known, (list(hole.alarms.alarms), len(hole.moved), hole.history.count)
+        paths = {"alarms": before[:2] != self._known[:2], "history": before[2] != self._known[2]}
         return [path for path, has_changed in paths.items() if has_changed]
 
     def restore(self) -> None:

@@ -24,7 +24,7 @@ from groundstation.service.orders.recalibration.control import Recalibration
 from groundstation.service.orders.recalibration.procedure import Request
 from groundstation.service.orders.surveyed_biases import surveyed_biases
 from groundstation.service.orders.uploads import Uploads
-from groundstation.survey.adjustment.tube_biases import SurveyedBiases
+from groundstation.survey.fusion.force_biases import SurveyedBiases
 from telemetry.application.arguments import check_arguments, parse_parameters, parse_tube
 from telemetry.application.commands import COMMANDS, CommandSpec, ObeyedBy, find_command
 from telemetry.errors import CommandError
@@ -308,7 +308,7 @@ class OperatorAccess:
 
     def _surveyed_biases(self) -> SurveyedBiases:
         states, mixed = self._string.states.newest, self._recalibration.procedure.progress.mixed
-        return surveyed_biases(self._model.hole, states, mixed)
+        return surveyed_biases(self._config, self._model.hole, states, mixed)
 
     def _cancel_upload(self, tube: int) -> None:
         if self._uploads is not None:

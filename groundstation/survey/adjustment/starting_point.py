@@ -58,8 +58,8 @@ def _mean_directions(looks: Looks, yaws: Array, path: PathPrior, weights: Array)
     units = np.stack([turned.real, turned.imag, -looks.force[:, 2]], axis=1)
     units /= np.linalg.norm(units, axis=1, keepdims=True)
     trusted = weights / (np.sin(np.sqrt(np.minimum(looks.yaw_var, 2.0))) ** 2 + 1e-8)
-    sums = np.stack([np.bincount(looks.station, trusted * one, minlength=len(path.md)) for one in units.T], axis=1)
-    tangents = np.empty_like(sums)
+    sums: Array = np.stack([np.bincount(looks.station, trusted * one, minlength=len(path.md)) for one in units.T], axis=1)
+    tangents: Array = np.empty_like(sums)
     tangents[0] = path.collar
     for k in range(1, len(sums)):
         size = float(np.linalg.norm(sums[k]))

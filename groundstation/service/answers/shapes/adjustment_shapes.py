@@ -35,9 +35,7 @@ class AdjustedTube:
     bias_mg: Annotated[list[float], "of its accelerometer, the tilt of its mount in it: x, y, z"]
     sigma_bias_mg: Annotated[list[float], "standard deviations of it"]
     looks: Annotated[int, "surveys of the tube that count"]
-    smallest_step_mg: Annotated[
-        float | None, "step at its newest stop that would be found; null if nothing can tell"
-    ]
+    smallest_step_mg: Annotated[float | None, "step at its newest stop that would be found; null if nothing can tell"]
     unfound_step_cm: Annotated[float | None, "what a step that is not found does at the toe at most"]
 
 

@@ -56,6 +56,17 @@ class ToleranceAlarmRow:
 
 
 @answer_class
+class MovedStation:
+    """A station where a survey contradicted those before it: the hole moved."""
+
+    md_m: MeasuredDepth
+    at_s: Annotated[float, "rig time"]
+    dropped_measurements: Annotated[int, "that no longer count"]
+    departure_sigma: Annotated[float, "of the new survey from those before"]
+    neighbours_sigma: Annotated[list[float], "of the stations beside it"]
+
+
+@answer_class
 class RigAlarmRow:
     """One alarm of the rig itself."""
 
@@ -80,5 +91,6 @@ class AlarmsAnswer:
     levels_percent: Annotated[list[float], "of the tolerance"]
     active: list[ToleranceAlarmRow]
     cleared: list[ToleranceAlarmRow]
+    moved: list[MovedStation]
     rig: list[RigAlarmRow]
     rig_cleared: list[RigAlarmRow]

@@ -44,6 +44,7 @@ class Station:
     ]
     sigma_transport_deg: Annotated[float, "standard deviation of that"]
     measurements: Annotated[int, "clusters measured here"]
+    dropped_measurements: Annotated[int, "of them from before the hole moved"]
     untrusted_measurements: Annotated[int, "of them with a yaw that is taken for unknown"]
     sigma_yaw_deg: RmsOfStation
     sigma_systematic_deg: RmsOfStation

@@ -13,7 +13,7 @@ from groundstation.errors import SelectorError
 from groundstation.service.disk.ground_store import Store
 from groundstation.service.orders.recalibration.procedure import FieldProcedure
 from groundstation.service.orders.recalibration.recalibration_progress import RecalibrationProgress
-from groundstation.survey.adjustment.tube_biases import SurveyedBiases
+from groundstation.survey.fusion.force_biases import SurveyedBiases
 from telemetry.errors import CalibrationError
 
 

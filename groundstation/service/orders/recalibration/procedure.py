@@ -22,7 +22,7 @@ from groundstation.service.orders.recalibration.recalibration_progress import (
     TubeProgress,
 )
 from groundstation.service.orders.recalibration.solution import Proposal, propose_bias, propose_block
-from groundstation.survey.adjustment.tube_biases import SurveyedBiases
+from groundstation.survey.fusion.force_biases import SurveyedBiases
 from telemetry.errors import CalibrationError
 from telemetry.messages import BlockStatus, NodeState, Reply, Scalar, StaticRecord, UploadPhase
 from telemetry.parameters import SHORT_HASH, ParameterBlock

@@ -12,7 +12,7 @@ from groundstation.calibration.block import Calibration, Provenance, to_json
 from groundstation.calibration.field_calibration import Rest, calibrate_accelerometer, inclination_rms
 from groundstation.service.orders.blocks import block_of
 from groundstation.service.orders.recalibration.recalibration_progress import Found
-from groundstation.survey.adjustment.tube_biases import ForceBias
+from groundstation.survey.fusion.force_biases import ForceBias
 from telemetry.parameters import ParameterBlock
 
 
