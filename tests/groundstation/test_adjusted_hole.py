@@ -118,7 +118,7 @@ def test_an_answer_of_nothing_is_empty(tmp_path: Path) -> None:
 
 
 def test_stations_that_are_fused_one_by_one_are_adjusted_beside(tmp_path: Path) -> None:
-    """By default the stations are fused one by one; what the tubes say about each other can be asked for all the same."""
+    """By default stations are fused one by one; what the tubes say about each other can be asked for all the same."""
     measurements: list[Placed] = passes(4, lambda _stop, _station: 1.0)
     model = knowing(tmp_path, measurements, 4)
     assert not model.hole.is_adjusted

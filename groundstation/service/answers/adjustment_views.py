@@ -16,7 +16,7 @@ from groundstation.service.answers.shapes.adjustment_shapes import (
     ToeShare,
 )
 from groundstation.service.answers.streamed_rows import Parameters
-from groundstation.service.hole.examined_hole import ExaminedHole, across
+from groundstation.service.hole.examined_hole import ExaminedHole, std_across
 from groundstation.survey.adjustment.blunders import Blunder
 from groundstation.survey.adjustment.tube_biases import bias_of_tube
 
@@ -36,7 +36,7 @@ def answer_adjustment(k: RigModel, _p: Parameters) -> AdjustmentAnswer:
         redundancy=found.redundancy,
         misfit=examined.examination.global_ratio,
         play_deg=math.degrees(math.sqrt(found.now.play_var)),
-        sigma_toe_cm=100.0 * across(np.sum([share.variances for share in examined.shares], axis=0)),
+        sigma_toe_cm=100.0 * std_across(np.sum([share.variances for share in examined.shares], axis=0)),
         blunders=[blunder_row(examined, one) for one in examined.examination.blunders],
         toe=toe_shares(examined),
         tubes=[adjusted_tube(examined, place) for place in range(len(examined.tubes))],
@@ -63,7 +63,7 @@ def blunder_row(examined: ExaminedHole, blunder: Blunder) -> BlunderRow:
 
 def toe_shares(examined: ExaminedHole) -> list[ToeShare]:
     """What each source gives at the toe, the worst first."""
-    shares = [ToeShare(*examined.share_name(one), 100.0 * across(one.variances)) for one in examined.shares]
+    shares = [ToeShare(*examined.share_name(one), 100.0 * std_across(one.variances)) for one in examined.shares]
     return sorted((one for one in shares if one.sigma_cm > LEAST_SHOWN_CM), key=lambda one: -one.sigma_cm)
 
 
@@ -71,7 +71,7 @@ def adjusted_tube(examined: ExaminedHole, place: int) -> AdjustedTube:
     """One tube as all surveys show it."""
     bias = bias_of_tube(examined.adjusted, place)
     step = next(one for one in examined.steps_found if one.hypothesis.subject == (place,))
-    unfound = across(np.square(step.unfound))
+    unfound = std_across(np.square(step.unfound))
     return AdjustedTube(
         tube=int(examined.tubes[place]),
         bias_mg=(bias.bias / MILLI_G).tolist(),

@@ -136,7 +136,7 @@ ANSWERS: Final = {
             AdjustmentAnswer,
             "what the tubes say about each other: how well all surveys fit, what is wrong and with what, sensors as "
             "learnt, of what the sigma at the toe is made, what would be found, the angle of the next stop",
-            of_the_hole=True,
+            published=False,
         ),
         AnswerKey(
             "column",

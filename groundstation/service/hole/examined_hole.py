@@ -101,6 +101,6 @@ class ExaminedHole:
         )
 
 
-def across(variances: Array) -> float:
+def std_across(variances: Array) -> float:
     """Standard deviation (m) across a hole from variances (3,) to north, east and down: the larger of the level two."""
     return float(np.sqrt(max(variances[:LEVEL].max(), 0.0)))

@@ -84,7 +84,7 @@ class HoleAdjustment:
 
     def _looked_at(self, seen: Rows, station: Places, station_md: Array) -> LookedAt:
         """Looks of rows of the table in the order of time, at their stations (m)."""
-        numbers, which = numbered(seen["chain"])
+        numbers, which = number_values(seen["chain"])
         chains, hanging = [self._shared.chain(number) for number in numbers], Hanging()
         hung = np.array([hanging.add_chain(chain) for chain in chains], np.intp)[which]
         newest = dict(zip(which.tolist(), seen["systematic_var"].tolist(), strict=True))
@@ -145,7 +145,7 @@ def grown_start(start: StartingPoint, used: Places, count: int, string: StringPr
     return replace(start, tangents=start.tangents[nearest], curvatures=curvatures, tubes=tubes, make_ups=make_ups)
 
 
-def numbered(values: npt.NDArray[np.uint32]) -> tuple[list[int], Places]:
+def number_values(values: npt.NDArray[np.uint32]) -> tuple[list[int], Places]:
     """Different values in the order of their coming, and the place (n,) of each among them."""
     different = dict.fromkeys(values.tolist())
     place = {value: number for number, value in enumerate(different)}

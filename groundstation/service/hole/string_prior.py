@@ -106,7 +106,9 @@ def causes_of_turns(
     for chain in chains:
         joints |= joint_variances(chain, totals)
     mounts = {chain[0]: min(mount_var, total) for chain, total in own.items()}
-    rows = [mounted(hanging, hung) for hung in hanging.tubes] + [made_up(hanging, hung) for hung in hanging.make_ups]
+    rows = [errors_of_mount(hanging, hung) for hung in hanging.tubes] + [
+        errors_of_make_up(hanging, hung) for hung in hanging.make_ups
+    ]
     names = list(dict.fromkeys(name for row in rows for name, _ in row))
     place = {name: number for number, name in enumerate(names)}
     columns = np.zeros((len(names), len(rows)))
@@ -115,24 +117,24 @@ def causes_of_turns(
             columns[place[name], number] += sign
     stds = np.sqrt([mounts[name[1]] if len(name) == OF_MOUNT else joints[name[1:]] for name in names])
     count = len(hanging.tubes)
-    return TurnCauses(tuple(named(hanging, name) for name in names), columns[:, :count], columns[:, count:], stds)
+    return TurnCauses(tuple(name_cause(hanging, name) for name in names), columns[:, :count], columns[:, count:], stds)
 
 
-def named(hanging: Hanging, name: Joint) -> tuple[str, int]:
+def name_cause(hanging: Hanging, name: Joint) -> tuple[str, int]:
     """Kind of a cause and the place of its tube: of a joint the one below it."""
     time, tube = name[:2]
     kind = MOUNT if len(name) == OF_MOUNT else (DRIVE_HEAD if name[-1] == DRIVE else JOINT)
     return kind, hanging.tubes.get((time, tube), -1)
 
 
-def mounted(hanging: Hanging, hung: Hung) -> list[tuple[Joint, float]]:
+def errors_of_mount(hanging: Hanging, hung: Hung) -> list[tuple[Joint, float]]:
     """Errors in the turn of a tube, with their signs: its mount, less the joints below it."""
     time, _ = hung
     below = [hung, *hanging.joints_below(hung)]
     return [(hung, 1.0), *(((time, lower[1], upper[1]), -1.0) for upper, lower in pairwise(below))]
 
 
-def made_up(hanging: Hanging, hung: Hung) -> list[tuple[Joint, float]]:
+def errors_of_make_up(hanging: Hanging, hung: Hung) -> list[tuple[Joint, float]]:
     """Errors in the turn of a make-up: all joints below its topmost tube, and the drive head on it."""
     time, top = hung
     if top < 0:

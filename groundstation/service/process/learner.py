@@ -16,7 +16,7 @@ from groundstation.service.hole.resolving import Found
 from groundstation.service.string.stored import Stored
 from telemetry.messages import Event, Kept, StaticRecord, SurveyMeasurement
 
-CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "adjustment", "column")
+CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column")
 RESTORED_TOGETHER = 256  # messages
 
 

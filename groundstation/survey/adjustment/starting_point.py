@@ -13,7 +13,7 @@ KNOWN_TURN = 0.3  # rad, standard deviation of a turn up to which it is used as 
 
 
 def first_start(looks: Looks, string: StringPrior, path: PathPrior) -> StartingPoint:
-    """Directions from the looks whose yaw is known best; turns that nobody knows from what others saw there.
+    """Directions from the looks whose yaw is known best; turns that are not known from what others saw there.
 
     Where a station has no look it goes on as the one above it.
     """
@@ -58,7 +58,8 @@ def _mean_directions(looks: Looks, yaws: Array, path: PathPrior, weights: Array)
     units = np.stack([turned.real, turned.imag, -looks.force[:, 2]], axis=1)
     units /= np.linalg.norm(units, axis=1, keepdims=True)
     trusted = weights / (np.sin(np.sqrt(np.minimum(looks.yaw_var, 2.0))) ** 2 + 1e-8)
-    sums: Array = np.stack([np.bincount(looks.station, trusted * one, minlength=len(path.md)) for one in units.T], axis=1)
+    count = len(path.md)
+    sums: Array = np.stack([np.bincount(looks.station, trusted * one, minlength=count) for one in units.T], axis=1)
     tangents: Array = np.empty_like(sums)
     tangents[0] = path.collar
     for k in range(1, len(sums)):
