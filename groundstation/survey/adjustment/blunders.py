@@ -156,7 +156,7 @@ def find_blunder(
     worth = best_of_kinds(score_hypotheses(found, run, hypotheses), found)
     if not worth:
         return None
-    many = math.log(len(hypotheses)) + log_of_stops(looks)
+    many = log_of_level(looks, run)
     adjusted = [_tried(looks, string, path, run, found, known, one) for one in worth]
     tried = [(with_one, _explained(with_one, found, one, many)) for with_one, one in zip(adjusted, worth, strict=True)]
     tried.sort(key=lambda pair: pair[1].log_chance)
@@ -169,13 +169,17 @@ def find_blunder(
 
 def chance_of_one(looks: Looks, run: RunOfStops) -> float:
     """Chance of a false alarm that one hypothesis has at the last stop, so that a whole hole keeps its own."""
-    return FALSE_ALARM * math.exp(-log_of_stops(looks)) / max(1, sum(1 for _ in all_hypotheses(looks, run)))
+    return FALSE_ALARM * math.exp(-log_of_level(looks, run))
 
 
-def log_of_stops(looks: Looks) -> float:
-    """Logarithm of k (k + 1), the part of all false alarms that is spent at the stop k: in sum over all stops, one."""
-    count = max(1, len(np.unique(looks.stop)))
-    return math.log(count * (count + 1.0))
+def log_of_level(looks: Looks, run: RunOfStops) -> float:
+    """Logarithm of how many chances an honest hole has: of all hypotheses, and k (k + 1) at the stop k.
+
+    The inverse of the latter is, in sum over all stops however many, one.
+    """
+    stops = max(1, len(np.unique(looks.stop)))
+    hypotheses = sum(1 for _ in all_hypotheses(looks, run))
+    return math.log(max(1, hypotheses) * stops * (stops + 1.0))
 
 
 def best_of_kinds(scores: Sequence[Score], found: Adjusted) -> list[Hypothesis]:
@@ -224,9 +228,9 @@ def _judged_again(
     if not blunder.is_doubt or blunder.second is None:
         return blunder
     others = _taken_in([one for k, one in enumerate(known) if k != place])
-    plain = adjust_with(looks, string, path, run, others).found
+    plain, many = adjust_with(looks, string, path, run, others).found, log_of_level(looks, run)
     tried = [
-        _explained(_tried(looks, string, path, run, plain, others, one.hypothesis), plain, one.hypothesis, 0.0)
+        _explained(_tried(looks, string, path, run, plain, others, one.hypothesis), plain, one.hypothesis, many)
         for one in (blunder.best, blunder.second)
     ]
     tried.sort(key=lambda one: one.log_chance)
