@@ -164,6 +164,18 @@ def test_a_look_that_may_be_the_first_of_a_step_is_a_doubt() -> None:
     assert len(one.taken_in) == 2
 
 
+@pytest.mark.slow
+def test_a_suspicion_is_not_told_and_stands_in_the_covariance() -> None:
+    """The encoder slips by 7.2 deg at the third stop, where the hole hardly leans: hardly anything shows it."""
+    drawn = draw_string(39, "encoder_slipped", 7.2)
+    found = examined(drawn)
+    assert drawn.onset == 2
+    assert found.blunders == ()
+    assert found.suspicion is not None
+    assert found.suspicion.best.hypothesis == Hypothesis(K.ENCODER_SLIPPED, (), 2)
+    assert toe_departure(found, drawn) < 13.8  # one in a thousand of chi-square with two degrees of freedom
+
+
 def test_two_blunders_are_found_one_after_another() -> None:
     drawn = draw_string(5, "bias_stepped", 17.0)
     yaw = drawn.looks.yaw + np.where(drawn.looks.stop >= 7, 7.2 * DEG, 0.0)
