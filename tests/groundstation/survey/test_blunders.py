@@ -11,6 +11,7 @@ import pytest
 from blame_table import examined, examined_as_it_grows, toe_departure, verdict
 from dense_hole import DenseHole, walk
 from drawn_strings import DEG, MG, SIZES, DrawnString, draw_string
+from scipy.stats import f as f_distribution
 
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.blunder_words import SENTENCES, say_blunder
@@ -23,7 +24,7 @@ from groundstation.survey.adjustment.hypotheses import (
     effect_amplitudes,
     thinned_stops,
 )
-from groundstation.survey.adjustment.scores import score_hypotheses
+from groundstation.survey.adjustment.scores import log_tail, score_hypotheses
 from groundstation.survey.adjustment.screen import is_suspicious
 from groundstation.survey.adjustment.taken_in import adjust_with, deviance_of
 
@@ -232,6 +233,17 @@ def test_no_two_hypotheses_of_a_kind_are_one(honest: DrawnString) -> None:
         if kind in OF_FORCE:
             rows = [tuple(effect_amplitudes(one, honest.looks, honest.run)) for one in some]
             assert len(set(rows)) == len(rows)
+
+
+@pytest.mark.parametrize("free", [5.0, 90.0, 1e9])
+@pytest.mark.parametrize("width", [1, 2, 3])
+def test_the_tail_is_that_of_f_and_goes_on_where_that_ends(width: int, free: float) -> None:
+    squares = np.array([0.01, 1.0, 30.0, 500.0])
+    told, tails = np.full(4, width), f_distribution.logsf(squares / width, width, free)
+    np.testing.assert_allclose(log_tail(squares, told, np.full(4, free)), tails, rtol=1e-4, atol=1e-9)
+    far = log_tail(np.array([1e4, 1e19]), told[:2], np.full(2, free))
+    assert np.all(np.isfinite(far))
+    assert far[1] < far[0] < tails[-1]
 
 
 @pytest.mark.parametrize("count", [1, 16, 17, 24, 25, 400])
