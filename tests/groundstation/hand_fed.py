@@ -15,6 +15,7 @@ from telemetry.presentation.msgpack_codec import encode_message
 
 VAR = (0.0034**2) / 32
 CALIBRATED = {"accelerometer_bias_std_deg": 0.002}
+TOLD = {"north_std_deg": 1e-12, "collar_std_deg": 1e-12, "collar_inclination_deg": 0.0, "mount_tilt_std_deg": 0.01}
 COV = ((VAR, 0.0, 0.0), (0.0, VAR, 0.0), (0.0, 0.0, VAR))
 
 
@@ -22,7 +23,7 @@ class Rig:
     """A ground station and the station of tube 1, joined directly by hand: frames in, frames out."""
 
     def __init__(self, folder: Path, **settings: Any) -> None:
-        self.ground = GroundProcess(GroundConfig(folder=folder, **CALIBRATED | settings))
+        self.ground = GroundProcess(GroundConfig(folder=folder, **CALIBRATED | TOLD | settings))
         self.tube = Endpoint(1, frozenset(Side), boot_count=1, is_clock_root=True)
         self.now = 1000.0
         self.source = DepthSource()
