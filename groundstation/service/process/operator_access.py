@@ -80,13 +80,8 @@ class OperatorAccess:
         self._recalibration = Recalibration(
             model.recalibration, store, config.calibrations, self._cancel_upload, self._surveyed_biases
         )
-        self._setup = SetupOrders(
-            model.setup,
-            store,
-            lambda: self._string.tubes,
-            lambda: self.follow_setup(),
-            partial(collar_doubt, model.hole),
-        )
+        doubt = partial(collar_doubt, model.hole)
+        self._setup = SetupOrders(model.setup, store, lambda: self._string.tubes, self._follow, doubt)
         self._handlers: dict[str, Callable[[SentOrder], None]] = {
             spec.name: self.tell_setup if spec.name in SETUP_COMMANDS else getattr(self, spec.name)
             for spec in COMMANDS
@@ -215,6 +210,9 @@ class OperatorAccess:
         """Take what is told of the setup, or take it back."""
         order.advance(OrderState.DONE, self._setup.obey(order))
         self.changed(["setup", "verdict"])
+
+    def _follow(self) -> int:
+        return self.follow_setup()
 
     def alarm(self, order: SentOrder) -> None:
         """Acknowledge an alarm, shelve it or take it back; kept on the disk before the order is done."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from groundstation.service.setup.setup_items import SetupItem, SetupSource, missing_names
+from groundstation.service.setup.setup_items import SetupItem, missing_names
 from groundstation.service.setup.told_value import SetupKind
 
 MOST_NAMED = 3  # joints in a line of the verdict
 WORTH_TELLING = 0.005  # m at the toe, from which on what was not told is the next thing to tell
 ORDERS = {
     SetupKind.NORTH: "tell north: cmd/north?action=tell;angle_deg=..;sigma_deg=..",
-    SetupKind.COLLAR: "tell the direction at the collar: cmd/collar?action=tell;inclination_deg=..;azimuth_deg=..;sigma_deg=..",
+    SetupKind.COLLAR: "tell the collar: cmd/collar?action=tell;inclination_deg=..;azimuth_deg=..;sigma_deg=..",
     SetupKind.STICK_UP: "tell the stick-up: cmd/stick_up?action=tell;height_m=..;sigma_m=..",
     SetupKind.MOUNT: "align tube {tube} in slow turns: cmd/align?tube={tube}",
     SetupKind.ACCELEROMETER: "calibrate tube {tube}: cmd/recalibrate?action=begin;tubes={tube}",
@@ -47,8 +47,3 @@ def order_of(item: SetupItem) -> str:
         drive = ";upper=0" if upper == "drive" else ""
         return f"tell joint {item.subject}: cmd/joint?tube={lower};angle_deg=..;sigma_deg=..{drive}"
     return ORDERS[item.kind].format(tube=item.subject)
-
-
-def is_assumed(item: SetupItem) -> bool:
-    """Whether an item stands by design or by default alone."""
-    return item.source in (SetupSource.DESIGN, SetupSource.DEFAULT)

@@ -1,7 +1,7 @@
 """What was told of the setup, in the order of telling, and which joints the nodes know no angle of. No I/O.
 
-Nothing that was told is forgotten: what is told again or taken back stays in the book, and the newest entry that was not
-taken back stands. What the configuration of the ground station tells stands where no order did.
+Nothing that was told is forgotten: what is told again or taken back stays in the book, and the newest entry that was
+not taken back stands. What the configuration of the ground station tells stands where no order did.
 """
 
 from __future__ import annotations

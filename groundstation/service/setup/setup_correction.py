@@ -40,9 +40,8 @@ def corrected_measurement(
     above : tubes above its own, lowest first; None where the order of the string is not known
     """
     systematic = measurement.systematic_var
-    turn, var = (
-        (0.0, systematic) if above is None else corrected_yaw(systematic, chain_of(measurement.tube, above), book)
-    )
+    chain = [] if above is None else chain_of(measurement.tube, above)
+    turn, var = corrected_yaw(systematic, chain, book)
     north = book.standing(SetupKind.NORTH)
     turn += 0.0 if north is None else north.values[0]
     if turn == 0.0 and var == systematic:

@@ -8,8 +8,10 @@ the same budget exactly, with what the tubes say about each other.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
 
 from groundstation.service.setup.setup_priors import SetupPrior, SetupPriors
 from groundstation.service.setup.told_value import SetupKind
@@ -52,7 +54,7 @@ def toe_costs(priors: SetupPriors, trajectory: Trajectory) -> Mapping[str, float
 def course_of(trajectory: Trajectory, tubes: int) -> ToeCourse:
     """Shape of a hole that so many tubes survey."""
     mds, toe = trajectory.md, trajectory.positions[-1]
-    legs = [float(lower - upper) for upper, lower in zip(mds[:-1], mds[1:], strict=True)] or [0.0]
+    legs = [float(lower - upper) for upper, lower in pairwise(mds)] or [0.0]
     return ToeCourse(
         float(mds[-1] - mds[0]), math.hypot(toe[0], toe[1]), legs[0], max(legs), max(len(mds) - 1, 1), tubes
     )
@@ -68,30 +70,16 @@ def designed_course(design: ColumnDesign, leg: float) -> Trajectory:
 
 
 def _cost_of(prior: SetupPrior, course: ToeCourse, tubes: list[int], trajectory: Trajectory) -> float:
-    sigma, averaged = prior.sigma, math.sqrt(course.tubes)
-    match prior.kind:
-        case SetupKind.NORTH:
-            return _turned(sigma, course.closure)
-        case SetupKind.JOINT:
-            return _turned(sigma, _closure_below(prior.subject, tubes, course, trajectory))
-        case SetupKind.MOUNT_TURN:
-            return _turned(sigma, course.closure) / averaged / averaged
-        case SetupKind.COLLAR:
-            return sigma * (course.first_leg / 2.0 if course.legs > 1 else course.length)
-        case SetupKind.MOUNT:
-            return sigma * course.length / averaged / averaged
-        case SetupKind.ACCELEROMETER:
-            return sigma / GRAVITY * course.length / averaged / averaged
-        case SetupKind.LENGTH | SetupKind.STICK_UP | SetupKind.DEPTH_OFFSET:
-            return sigma
-        case SetupKind.DEPTH_SCALE:
-            return sigma * course.length
-        case SetupKind.PLAY:
-            return sigma * course.length / math.sqrt(course.legs * course.tubes)
-        case SetupKind.PATH:
-            return sigma * course.longest_leg**2 / 8.0 * math.sqrt(course.legs)
-        case _:
-            return 0.0  # a direction does not depend on the size of gravity, and a yaw is aided past its gyroscope
+    """Standard deviation at the toe (m) by one item; zero of what moves no direction: gravity, an aided gyroscope."""
+    if prior.kind is SetupKind.JOINT:
+        return _turned(prior.sigma, _closure_below(prior.subject, tubes, course, trajectory))
+    cost = COSTS.get(prior.kind)
+    return 0.0 if cost is None else cost(prior.sigma, course)
+
+
+def _cost_of_collar(sigma: float, course: ToeCourse) -> float:
+    """The collar enters the first leg alone where stations are surveyed below it."""
+    return sigma * (course.first_leg / 2.0 if course.legs > 1 else course.length)
 
 
 def _turned(sigma: float, closure: float) -> float:
@@ -111,3 +99,18 @@ def _closure_below(subject: str, tubes: list[int], course: ToeCourse, trajectory
     place = min(int(trajectory.md.searchsorted(depth)), len(trajectory.md) - 1)
     north, east = (trajectory.positions[-1] - trajectory.positions[place])[:2]
     return math.hypot(north, east)
+
+
+COSTS: Final[dict[SetupKind, Callable[[float, ToeCourse], float]]] = {
+    SetupKind.NORTH: lambda sigma, course: _turned(sigma, course.closure),
+    SetupKind.COLLAR: _cost_of_collar,
+    SetupKind.MOUNT: lambda sigma, course: sigma * course.length / course.tubes,
+    SetupKind.MOUNT_TURN: lambda sigma, course: _turned(sigma, course.closure) / course.tubes,
+    SetupKind.ACCELEROMETER: lambda sigma, course: sigma / GRAVITY * course.length / course.tubes,
+    SetupKind.LENGTH: lambda sigma, _course: sigma,
+    SetupKind.STICK_UP: lambda sigma, _course: sigma,
+    SetupKind.DEPTH_OFFSET: lambda sigma, _course: sigma,
+    SetupKind.DEPTH_SCALE: lambda sigma, course: sigma * course.length,
+    SetupKind.PLAY: lambda sigma, course: sigma * course.length / math.sqrt(course.legs * course.tubes),
+    SetupKind.PATH: lambda sigma, course: sigma * course.longest_leg**2 / 8.0 * math.sqrt(course.legs),
+}
