@@ -116,5 +116,7 @@ def checked_config(**settings: Any) -> GroundConfig:
         return GroundConfig(**settings)
     except ValidationError as error:
         first = error.errors()[0]
-        name = ".".join(str(part) for part in first["loc"]) or "settings"
+        if not first["loc"]:
+            raise ConfigurationError(first["msg"]) from error
+        name = ".".join(str(part) for part in first["loc"])
         raise ConfigurationError(f"{name}: {first['msg']}, got {first['input']!r:.60}") from error

@@ -12,7 +12,7 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.shapes.setup_shapes import SetupAnswer, SetupRow
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.setup.readiness import next_step
-from groundstation.service.setup.setup_items import SetupItem, missing_names, setup_items
+from groundstation.service.setup.setup_items import ALONG, SetupItem, missing_names, setup_items
 from groundstation.service.setup.setup_priors import setup_priors
 from groundstation.service.setup.toe_costs import designed_course, toe_costs
 
@@ -60,4 +60,5 @@ def setup_row(item: SetupItem, costs: Mapping[str, float], now: float) -> SetupR
         age_s=None if not item.utc else max(now - datetime.datetime.fromisoformat(item.utc).timestamp(), 0.0),
         times_told=item.times_told,
         toe_cm=float(f"{100.0 * costs[item.name]:.3g}"),
+        way="along" if item.kind in ALONG else "across",
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from groundstation.service.setup.setup_items import SetupItem, missing_names
+from groundstation.service.setup.setup_items import ALONG, SetupItem, missing_names
 from groundstation.service.setup.told_value import SetupKind
 
 MOST_NAMED = 3  # joints in a line of the verdict
@@ -30,14 +30,17 @@ def told_briefly(names: Sequence[str]) -> str:
 
 
 def next_step(items: Sequence[SetupItem], costs: Mapping[str, float]) -> str:
-    """The one thing to do next: what is missing first, then what costs most at the toe and can be told or measured."""
+    """The one thing to do next: what is missing first, then what costs most at the toe and can be told or measured.
+
+    What moves the toe across the hole comes before what moves it along.
+    """
     if missing := missing_names(list(items)):
         return order_of(next(item for item in items if item.name == missing[0]))
     guessed = [item for item in items if not item.is_told and item.kind in ORDERS]
-    worst = max(guessed, key=lambda item: costs.get(item.name, 0.0), default=None)
-    if worst is None or costs.get(worst.name, 0.0) < WORTH_TELLING:
+    worth = [item for item in guessed if costs.get(item.name, 0.0) >= WORTH_TELLING]
+    if not worth:
         return "nothing: the setup is told"
-    return order_of(worst)
+    return order_of(max(worth, key=lambda item: (item.kind not in ALONG, costs.get(item.name, 0.0))))
 
 
 def order_of(item: SetupItem) -> str:

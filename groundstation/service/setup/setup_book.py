@@ -17,7 +17,6 @@ from groundstation.service.setup.told_value import (
     SetupKind,
     ToldValue,
     item_name,
-    joint_subject,
 )
 from telemetry.messages import NodeFlag
 
@@ -34,6 +33,7 @@ class SetupBook:
     Attributes
     ----------
     entries : everything that orders told, the oldest first
+    joints, lengths : what stands of the joints, and of the tubes
     version : grows with everything by which surveys mean something else
     revision : grows with everything that is entered, or that a node says anew of what it was told
     """
@@ -42,9 +42,12 @@ class SetupBook:
         self._by_config = {told.name: told for told in told_by_config(config)}
         self.entries: list[ToldValue] = []
         self.version = self.revision = 0
-        self._standing: dict[str, ToldValue] = dict(self._by_config)
+        self._standing: dict[str, ToldValue] = {}
+        self.joints: dict[Pair, ToldValue] = {}
+        self.lengths: dict[int, ToldValue] = {}
         self._lowers: dict[int, bool] = {}  # by tube, whether its node was told the angle of the joint below it
         self._drives: dict[int, bool] = {}  # and that of the joint to the drive head, of each that hung from it
+        self._stand()
 
     def standing(self, kind: SetupKind, subject: object = "") -> ToldValue | None:
         """What stands of an item; None where it was not told, or that was taken back."""
@@ -67,12 +70,19 @@ class SetupBook:
     def add(self, entries: Iterable[ToldValue]) -> None:
         """Enter what was told, or is taken back."""
         self.entries += entries
+        self._stand()
+        self.version += 1
+        self.revision += 1
+
+    def _stand(self) -> None:
+        """Find what stands."""
         gone = {entry.takes_back for entry in self.entries}
         self._standing = self._by_config | {
             entry.name: entry for entry in self.entries if not entry.takes_back and entry.number not in gone
         }
-        self.version += 1
-        self.revision += 1
+        standing = self._standing.values()
+        self.joints = {pair_of(told.subject): told for told in standing if told.kind is SetupKind.JOINT}
+        self.lengths = {int(told.subject): told for told in standing if told.kind is SetupKind.LENGTH}
 
     def on_flags(self, tube: int, hops: int, flags: NodeFlag) -> None:
         """A node says, in a state or a measurement, which angles it was not told."""
@@ -83,12 +93,7 @@ class SetupBook:
             self._drives[tube] = not bits & int(NodeFlag.DRIVE_UNTOLD)
         if before != (self._lowers[tube], self._drives.get(tube)):
             self.revision += 1
-            self.version += self._has_joints
-
-    @property
-    def _has_joints(self) -> bool:
-        """Whether the angle of a joint stands, so that what a node knows of it matters."""
-        return any(told.kind is SetupKind.JOINT for told in self._standing.values())
+            self.version += bool(self.joints)  # where an angle stands it matters what the node knows of it
 
     def node_knows(self, pair: Pair) -> bool | None:
         """Whether a node was told the angle of a joint; None where none has said so."""
@@ -100,9 +105,11 @@ class SetupBook:
         tops = [*tubes[:1], *(tube for tube in tubes[1:] if tube in self._drives)]
         return [*((DRIVE, tube) for tube in tops), *pairwise(tubes)]
 
-    def is_untold(self, pair: Pair) -> bool:
-        """Whether neither its node nor the ground station knows the angle of a joint."""
-        return self.node_knows(pair) is False and self.standing(SetupKind.JOINT, joint_subject(*pair)) is None
+
+def pair_of(subject: str) -> Pair:
+    """Tubes of a joint's name, the inverse of ``joint_subject``."""
+    upper, lower = subject.split("-")
+    return DRIVE if upper == "drive" else int(upper), int(lower)
 
 
 def told_by_config(config: GroundConfig) -> Iterable[ToldValue]:

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 from groundstation.service.setup.setup_book import Pair, SetupBook
 from groundstation.service.setup.setup_items import JOINT_STD
-from groundstation.service.setup.told_value import DRIVE, SetupKind, ToldValue, joint_subject
+from groundstation.service.setup.told_value import DRIVE, SetupKind, ToldValue
 from groundstation.survey.bearings import wrap_azimuth
 from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
 from telemetry.frozen import replace
@@ -40,7 +40,7 @@ def corrected_measurement(
     above : tubes above its own, lowest first; None where the order of the string is not known
     """
     systematic = measurement.systematic_var
-    chain = [] if above is None else chain_of(measurement.tube, above)
+    chain = [] if above is None or not book.joints else chain_of(measurement.tube, above)
     turn, var = corrected_yaw(systematic, chain, book)
     north = book.standing(SetupKind.NORTH)
     turn += 0.0 if north is None else north.values[0]
@@ -57,7 +57,7 @@ def corrected_yaw(systematic_var: float, chain: Sequence[Pair], book: SetupBook)
     systematic_var : rad^2, as the node said it
     chain : joints from the tube up to the drive head
     """
-    told = {pair: known for pair in chain if (known := book.standing(SetupKind.JOINT, joint_subject(*pair)))}
+    told = {pair: book.joints[pair] for pair in chain if pair in book.joints}
     if not told:
         return 0.0, systematic_var
     lacked = {pair: known for pair, known in told.items() if known.used is None}
@@ -87,6 +87,7 @@ def depth_shift(tube: int, tubes: Sequence[int], tube_length: float, book: Setup
     """
     stick_up = book.standing(SetupKind.STICK_UP)
     shift = 0.0 if stick_up is None else -stick_up.values[0]
-    below = tubes[tubes.index(tube) + 1 :] if tube in tubes else ()
-    lengths = [known.values[0] for one in below if (known := book.standing(SetupKind.LENGTH, one))]
-    return shift + math.fsum(tube_length - length for length in lengths)
+    if not book.lengths or tube not in tubes:
+        return shift
+    below = (book.lengths[one] for one in tubes[tubes.index(tube) + 1 :] if one in book.lengths)
+    return shift + math.fsum(tube_length - told.values[0] for told in below)

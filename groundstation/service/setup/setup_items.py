@@ -28,6 +28,7 @@ DEPTH_SCALE_STD, DEPTH_OFFSET_STD = 1e-3, 0.05  # 1 and m, of the block's positi
 PLAY_STD = 0.05 * DEG  # each way, another one at every stop
 PATH_STD = 0.2 * DEG  # rad/m, curvature of a hole between two stations
 GRAVITY_STD = 0.02  # m/s^2, of the Earth's, where the site's is not measured
+ALONG = (SetupKind.LENGTH, SetupKind.STICK_UP, SetupKind.DEPTH_SCALE, SetupKind.DEPTH_OFFSET)  # errors of the depth
 GYROSCOPE_BIAS_STD = 0.02 * DEG  # rad/s; a node measures its own at rest
 
 

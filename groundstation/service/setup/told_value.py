@@ -5,12 +5,14 @@ from __future__ import annotations
 import enum
 import json
 import math
+import re
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Final
 
 from groundstation.errors import GroundError
 
 CONFIGURATION = "configuration"  # tells what stands in the options of the ground station
+NO_SUBJECT: Final = re.compile("")
 DRIVE = 0  # stands for the drive head among the tubes of a pair
 
 
@@ -31,6 +33,12 @@ class SetupKind(enum.StrEnum):
     PLAY = "play"
     PATH = "path"
     GRAVITY = "gravity"
+
+
+SUBJECTS: Final = {
+    SetupKind.JOINT: re.compile(r"([0-9]{1,3}|drive)-[0-9]{1,3}"),
+    SetupKind.LENGTH: re.compile(r"[0-9]{1,3}"),
+}
 
 
 class DamagedSetupError(GroundError, ValueError):
@@ -101,6 +109,8 @@ def told_of_text(text: str) -> ToldValue:
         told = ToldValue(**row | {"kind": SetupKind(row["kind"]), "values": tuple(map(float, row["values"]))})
     except (ValueError, TypeError, KeyError) as error:
         raise DamagedSetupError(f"expected a value of the setup, got {text:.60}") from error
+    if SUBJECTS.get(told.kind, NO_SUBJECT).fullmatch(told.subject) is None or not (told.values or told.takes_back):
+        raise DamagedSetupError(f"expected a value of the setup, got {text:.60}")
     if not all(map(math.isfinite, (*told.values, told.sigma, told.used or 0.0))):
         raise DamagedSetupError(f"expected finite numbers of the setup, got {text:.60}")
     return told

@@ -28,6 +28,7 @@ class SetupRow:
     age_s: Annotated[float | None, "since then; null where no order told it"]
     times_told: Annotated[int, "by orders, also what does not stand any more"]
     toe_cm: Annotated[float, "standard deviation that it makes at the toe"]
+    way: Annotated[str, "across the hole, or along it where it is one of the depth", OneOf("across", "along")]
 
 
 @answer_class
