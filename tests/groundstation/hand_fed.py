@@ -28,6 +28,8 @@ class Rig:
         self.now = 1000.0
         self.source = DepthSource()
         self.hops: dict[int, int] = {}  # as each tube has told them last
+        self.untold: dict[int, NodeFlag] = {}  # angles that the node of a tube was not told
+        self.yaw, self.systematic_var = 0.0, 1e-8  # of every survey, rad and rad^2
 
     md = 0.0
 
@@ -70,7 +72,7 @@ class Rig:
         self.hops[tube] = hops
         state = NodeState(
             tube, self.now, hops, NodeMode.TRACKING, 1.0, 1e-6, 1e-6, (0.0, 0.0, 0.0), scale, 0.0, 1e-6, 0.1, 1e-8,
-            NodeFlag.NONE, 5, 0,
+            self.untold.get(tube, NodeFlag.NONE), 5, 0,
         )  # fmt: skip
         self.tube.send_state(state, self.now)
 
@@ -96,7 +98,9 @@ class Rig:
         lean = math.radians(inclination_deg)
         imus = (ImuMean((9.81 * math.sin(lean), 0.0, -9.81 * math.cos(lean)), COV),)
         hops = self.hops.get(tube, 1)
-        message = SurveyMeasurement(tube, sequence, self.now, hops, imus, 0.0, 1e-8, 1e-8, 32, 20.0, flags)
+        flags |= self.untold.get(tube, NodeFlag.NONE)
+        yaw = self.yaw, 1e-8, self.systematic_var
+        message = SurveyMeasurement(tube, sequence, self.now, hops, imus, *yaw, 32, 20.0, flags)
         self.tube.mail.submit(message, self.now)
         self.run(2.0)
         self.read_depth(self.md)
