@@ -550,6 +550,8 @@ export interface SetupRow {
   times_told: number;
   /** standard deviation that it makes at the toe */
   toe_cm: number;
+  /** across the hole, or along it where it is one of the depth */
+  way: "across" | "along";
 }
 
 /** What is known of the rig, the item that costs most at the toe first. */
