@@ -299,7 +299,7 @@ async def test_north_is_missed_on_the_setup_panel_told_in_a_line_and_taken_back(
             assert "NOT READY TO DRILL, not told: north" in lines
             assert "next: tell north: cmd/north?action=tell;angle_deg=..;sigma_deg=.." in lines
             head = next(place for place, line in enumerate(lines) if line.startswith("item"))
-            assert lines[head + 1].split()[:3] == ["north", "any", "104"]
+            assert lines[head + 1].split()[:4] == ["north", "3.7", "any", "104"]
             await pilot.press("o", *"north action=tell angle_deg=12.5 sigma_deg=0.3", "enter")
             text = await until(app, served, lambda text: "\nREADY TO DRILL" in text, speaks_of(3))
             assert "next: align tube 3 in slow turns: cmd/align?tube=3" in text

@@ -25,7 +25,7 @@ def setup_panel(picture: Picture, now_utc: datetime.datetime) -> Text:
     ready = told if found["ready"] else f"NOT READY TO DRILL, not told: {', '.join(found['missing'])}"
     lines = [fit_line(ready, "bold" if found["ready"] else "bold white on magenta")]
     lines += [fit_line(f"next: {found['todo']}", "")]
-    lines += [fit_line(f"{'item':15} {'value':>15} {'sigma':>9} {'unit':6} {'toe cm':>6} {'age':>6} source", "bold")]
+    lines += [fit_line(f"{'item':15} {'toe cm':>6} {'value':>15} {'sigma':>9} {'unit':6} {'age':>6} source", "bold")]
     lines += [setup_line(row, now_utc) for row in found["items"][: PLAN_HEIGHT - HEAD_LINES]]
     return Text("\n").join(lines)
 
@@ -34,7 +34,7 @@ def setup_line(row: View, now_utc: datetime.datetime) -> Text:
     """One item."""
     value = " to ".join(f"{number:.4g}" for number in row["value"]) or ("of its node" if row["told"] else "any")
     age = age_text(row["utc"], now_utc)
-    line = f"{row['item']:15} {value:>15} {row['sigma']:9.3g} {row['unit']:6} {row['toe_cm']:6.1f} {age:>6}"
+    line = f"{row['item']:15} {row['toe_cm']:6.1f} {value:>15} {row['sigma']:9.3g} {row['unit']:6} {age:>6}"
     style = "bold red" if row["missing"] else "yellow" if not row["told"] and row["toe_cm"] >= LEAST_CM else QUIET
     return fit_line(f"{line} {row['source']}", style)
 

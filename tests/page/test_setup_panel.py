@@ -29,7 +29,7 @@ def test_what_is_missing_is_named_told_by_a_driller_and_taken_back(rig: Beating,
     expect(page.locator("#next")).to_contain_text("Next: tell north")
     first = page.locator("#setup-items tr").first
     expect(first).to_have_class("grave")
-    expect(first.locator("td").nth(1)).to_have_text("any")
+    expect(first.locator("td").nth(2)).to_have_text("any")
 
     page.fill("#tell-angle_deg", "12.5")
     page.fill("#tell-sigma_deg", "0.3")

@@ -28,12 +28,13 @@ def answer_setup(k: RigModel, _p: Parameters) -> SetupAnswer:
     course = trajectory if is_surveyed else designed_course(k.config.design, k.config.tube_length)
     costs = toe_costs(setup_priors(items, k.setup.version), course)
     missing = missing_names(items)
-    ordered = sorted(items, key=lambda item: (not item.is_missing, -costs[item.name]))
+    # a column is judged across its axis: what is wrong of the depth comes after all else
+    ordered = sorted(items, key=lambda item: (not item.is_missing, item.kind in ALONG, -costs[item.name]))
     return SetupAnswer(
         ready=not missing,
         missing=missing,
         todo=next_step(items, costs),
-        worst=max(items, key=lambda item: costs[item.name]).name,
+        worst=max(items, key=lambda item: (item.kind not in ALONG, costs[item.name])).name,
         at_m=round(float(course.md[-1]), 3),
         surveyed=is_surveyed,
         left_out=LEFT_OUT,

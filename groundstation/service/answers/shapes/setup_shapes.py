@@ -33,12 +33,12 @@ class SetupRow:
 
 @answer_class
 class SetupAnswer:
-    """What is known of the rig, the item that costs most at the toe first."""
+    """What is known of the rig: what is missing first, then what costs most at the toe, across the hole before along."""
 
     ready: Annotated[bool, "nothing is missing"]
     missing: Annotated[list[str], "items without which the hole is not known"]
     todo: Annotated[str, "the next thing to do"]
-    worst: Annotated[str, "item that costs most at the toe"]
+    worst: Annotated[str, "item that costs most at the toe, across the hole"]
     at_m: Annotated[float, "measured depth of the toe"]
     surveyed: Annotated[bool, "the costs are of the hole as surveyed; before the first station of its design"]
     left_out: Annotated[str, "what the costs do not hold"]

@@ -554,7 +554,7 @@ export interface SetupRow {
   way: "across" | "along";
 }
 
-/** What is known of the rig, the item that costs most at the toe first. */
+/** What is known of the rig: what is missing first, then what costs most at the toe, across the hole before along. */
 export interface SetupAnswer {
   /** nothing is missing */
   ready: boolean;
@@ -562,7 +562,7 @@ export interface SetupAnswer {
   missing: string[];
   /** the next thing to do */
   todo: string;
-  /** item that costs most at the toe */
+  /** item that costs most at the toe, across the hole */
   worst: string;
   /** measured depth of the toe */
   at_m: number;

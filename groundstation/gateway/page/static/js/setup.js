@@ -30,7 +30,8 @@ export function showSetup(setup, now) {
   write(byId("costs"), `Toe at ${setup.at_m.toFixed(1)} m, ${whose}. Its ± has besides: ${setup.left_out}.`);
   fillList(byId("setup-items"), setup.items, (row) => row.item, () => element("tr", {}, ...Array.from({ length: 7 }, () => element("td"))), (line, row) => {
     line.className = row.missing ? "grave" : !row.told && row.toe_cm >= LEAST_CM ? "serious" : "";
-    const texts = [row.item.replaceAll("_", " "), valueText(row), plain(row.sigma), row.unit, `${row.toe_cm.toFixed(1)}${row.toe_cm >= LEAST_CM && row.way === "along" ? " along" : ""}`, ageText(row, now), `${row.source}: ${row.detail}`];
+    const toe = `${row.toe_cm.toFixed(1)}${row.toe_cm >= LEAST_CM && row.way === "along" ? " along" : ""}`;
+    const texts = [row.item.replaceAll("_", " "), toe, valueText(row), plain(row.sigma), row.unit, ageText(row, now), `${row.source}: ${row.detail}`];
     texts.forEach((text, place) => write(line.children[place], text));
   });
 }
