@@ -554,7 +554,7 @@ export interface SetupRow {
   way: "across" | "along";
 }
 
-/** What is known of the rig: what is missing first, then what costs most at the toe, across the hole before along. */
+/** What is known of the rig: what is missing first, then what costs most at the toe, across the hole, then along. */
 export interface SetupAnswer {
   /** nothing is missing */
   ready: boolean;
