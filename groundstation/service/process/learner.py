@@ -137,12 +137,15 @@ class Learner:
             return []
         damaged = self._store.damaged
         try:
-            stored = [one for one in self._store.messages() if isinstance(one.message, SurveyMeasurement)]
+            placed = [
+                (message, one.md)
+                for one in self._store.messages()
+                if isinstance(message := one.message, SurveyMeasurement) and one.md is not None
+            ]
         except StoreError:
             return []
         self._store.damaged = damaged  # they were counted at the start
         self._hole.begin_anew()
-        placed = [(one.message, one.md) for one in stored if one.md is not None]
         for begin in range(0, len(placed), RESTORED_TOGETHER):
             some = placed[begin : begin + RESTORED_TOGETHER]
             found = self._placement.resolve_measurements([m for m, _ in some], [md for _, md in some])

@@ -53,7 +53,8 @@ def collar_direction(config: GroundConfig, book: SetupBook) -> Direction:
         return uncertain_direction(
             math.radians(config.design_inclination_deg), math.radians(config.design_azimuth_deg), COLLAR_STD
         )
-    return uncertain_direction(*told.values, told.sigma)
+    inclination, azimuth = told.values
+    return uncertain_direction(inclination, azimuth, told.sigma)
 
 
 def uncertain_direction(inclination: float, azimuth: float, std: float) -> Direction:
