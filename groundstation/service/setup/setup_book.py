@@ -34,6 +34,7 @@ class SetupBook:
     ----------
     entries : everything that orders told, the oldest first
     joints, lengths : what stands of the joints, and of the tubes
+    north, stick_up : angle (rad) and height (m) that stand; zero where none does
     version : grows with everything by which surveys mean something else
     revision : grows with everything that is entered, or that a node says anew of what it was told
     """
@@ -45,6 +46,7 @@ class SetupBook:
         self._standing: dict[str, ToldValue] = {}
         self.joints: dict[Pair, ToldValue] = {}
         self.lengths: dict[int, ToldValue] = {}
+        self.north = self.stick_up = 0.0
         self._lowers: dict[int, bool] = {}  # by tube, whether its node was told the angle of the joint below it
         self._drives: dict[int, bool] = {}  # and that of the joint to the drive head, of each that hung from it
         self._stand()
@@ -82,6 +84,9 @@ class SetupBook:
         }
         standing = self._standing.values()
         self.joints = {pair_of(told.subject): told for told in standing if told.kind is SetupKind.JOINT}
+        north, stick_up = self.standing(SetupKind.NORTH), self.standing(SetupKind.STICK_UP)
+        self.north = 0.0 if north is None else north.values[0]
+        self.stick_up = 0.0 if stick_up is None else stick_up.values[0]
         self.lengths = {int(told.subject): told for told in standing if told.kind is SetupKind.LENGTH}
 
     def on_flags(self, tube: int, hops: int, flags: NodeFlag) -> None:

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 from groundstation.service.setup.setup_book import Pair, SetupBook
 from groundstation.service.setup.setup_items import JOINT_STD
-from groundstation.service.setup.told_value import DRIVE, SetupKind, ToldValue
+from groundstation.service.setup.told_value import DRIVE, ToldValue
 from groundstation.survey.bearings import wrap_azimuth
 from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
 from telemetry.frozen import replace
@@ -39,12 +39,11 @@ def corrected_measurement(
     ----------
     above : tubes above its own, lowest first; None where the order of the string is not known
     """
-    systematic = measurement.systematic_var
-    chain = [] if above is None or not book.joints else chain_of(measurement.tube, above)
-    turn, var = corrected_yaw(systematic, chain, book)
-    north = book.standing(SetupKind.NORTH)
-    turn += 0.0 if north is None else north.values[0]
-    if turn == 0.0 and var == systematic:
+    turn, var = book.north, measurement.systematic_var
+    if above is not None and book.joints:
+        by_joints, var = corrected_yaw(var, chain_of(measurement.tube, above), book)
+        turn += by_joints
+    if turn == 0.0 and var == measurement.systematic_var:
         return measurement
     return replace(measurement, yaw=float(wrap_azimuth(measurement.yaw + turn)), systematic_var=min(var, LARGEST_VAR))
 
@@ -85,9 +84,7 @@ def depth_shift(tube: int, tubes: Sequence[int], tube_length: float, book: Setup
     tubes : of the string, from the top down
     tube_length : m, of every tube of the tally
     """
-    stick_up = book.standing(SetupKind.STICK_UP)
-    shift = 0.0 if stick_up is None else -stick_up.values[0]
     if not book.lengths or tube not in tubes:
-        return shift
+        return -book.stick_up
     below = (book.lengths[one] for one in tubes[tubes.index(tube) + 1 :] if one in book.lengths)
-    return shift + math.fsum(tube_length - told.values[0] for told in below)
+    return math.fsum(tube_length - told.values[0] for told in below) - book.stick_up
