@@ -102,7 +102,7 @@ def missing_names(items: list[SetupItem]) -> list[str]:
 
 
 def _items_of_rig(config: GroundConfig, book: SetupBook) -> Iterator[SetupItem]:
-    design = math.radians(config.design_inclination_deg), math.radians(config.design_azimuth_deg)
+    design = config.design.inclination, config.design.azimuth
     for kind, unit, needed, values, sigma, source, detail in (
         (SetupKind.NORTH, "rad", True, (), UNKNOWN_YAW_STD, SetupSource.DEFAULT, "not told: any azimuth may be"),
         (SetupKind.COLLAR, "rad", False, design, COLLAR_STD, SetupSource.DESIGN, "not told: as the design"),
