@@ -10,10 +10,15 @@ import pytest
 from hand_fed import TOLD, Rig
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tapes import write
 
 from groundstation.config import checked_config
 from groundstation.errors import ConfigurationError, SelectorError, StoreError
+from groundstation.recording.ground_replay import replay_file
+from groundstation.recording.recording_file import Recording
 from groundstation.service.process.ground_process import GroundProcess
+from groundstation.service.setup.setup_items import setup_items
+from groundstation.service.setup.setup_priors import SetupPriors, setup_priors
 from groundstation.service.setup.told_value import (
     DamagedSetupError,
     SetupKind,
@@ -307,3 +312,41 @@ def test_every_command_of_the_setup_has_a_sigma_and_no_setup_command_goes_to_a_t
         assert sigma.quantity.low > 0.0
     with pytest.raises(CommandError):
         find_command("setup", "forget")
+
+
+def test_a_recording_repeats_what_was_told(tmp_path: Path) -> None:
+    rig = drilled(tmp_path / "ground")
+    order(rig, "north", action="tell", angle_deg=12.5, sigma_deg=0.2)
+    order(rig, "joint", tube=1, angle_deg=3.0, sigma_deg=0.1, used_deg=1.0)
+    order(rig, "setup", action="undo")
+    write(tmp_path / "shift.mcap", rig.ground)
+    again = replay_file(Recording(tmp_path / "shift.mcap"), tmp_path / "again").ground
+    assert again.operator.ask("stations")["stations"] == rig.ask("stations")["stations"]
+    assert [told.name for told in again.store.told()] == ["north", "joint.2-1", "joint.2-1"]
+    again.close()
+
+
+def test_priors_are_one_frozen_record_by_name(tmp_path: Path) -> None:
+    """What nothing tells has a sigma that is wide enough to be true, and what is told its own."""
+    rig = drilled(tmp_path, **NOTHING_TOLD)
+    model = rig.ground.model
+
+    def priors() -> SetupPriors:
+        return setup_priors(setup_items(model.config, model.setup, model.string), model.setup.version)
+
+    before = priors()
+    assert before.by_name["north"].sigma == pytest.approx(math.sqrt(ANY_YAW))
+    assert before.by_name["north"].mean == ()
+    assert before.by_name["collar"].sigma == pytest.approx(math.radians(1.0))
+    assert before.by_name["mount.2"].sigma == pytest.approx(math.radians(0.5))
+    expected = {"joint.2-1", "joint.drive-2", "joint.drive-1", "length.1", "stick_up", "depth_scale", "depth_offset"}
+    assert expected <= before.by_name.keys()
+    assert {"accelerometer.1", "gyroscope.2", "mount_turn.1", "play", "path", "gravity"} <= before.by_name.keys()
+    order(rig, "north", action="tell", angle_deg=12.5, sigma_deg=0.2)
+    after = priors()
+    assert after.version > before.version
+    assert after.by_name["north"].mean == (pytest.approx(math.radians(12.5)),)
+    assert after.by_name["north"].sigma == pytest.approx(math.radians(0.2))
+    assert all(prior.sigma > 0.0 for prior in after.by_name.values())
+    with pytest.raises(AttributeError):
+        after.version = 7  # type: ignore[misc]
