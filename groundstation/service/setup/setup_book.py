@@ -20,6 +20,7 @@ from groundstation.service.setup.told_value import (
 )
 from telemetry.messages import NodeFlag
 
+UNTOLD_BITS = int(NodeFlag.LOWER_UNTOLD | NodeFlag.DRIVE_UNTOLD)
 Pair = tuple[int, int]  # upper tube, or ``DRIVE``, and lower tube
 
 
@@ -49,6 +50,7 @@ class SetupBook:
         self.north = self.stick_up = 0.0
         self._lowers: dict[int, bool] = {}  # by tube, whether its node was told the angle of the joint below it
         self._drives: dict[int, bool] = {}  # and that of the joint to the drive head, of each that hung from it
+        self._lacked: set[int] = set()  # tubes whose joint below was not told once, less than zero: to the drive head
         self._stand()
 
     def standing(self, kind: SetupKind, subject: object = "") -> ToldValue | None:
@@ -96,6 +98,10 @@ class SetupBook:
         self._lowers[tube] = not bits & int(NodeFlag.LOWER_UNTOLD)
         if hops == 1:
             self._drives[tube] = not bits & int(NodeFlag.DRIVE_UNTOLD)
+        if bits & UNTOLD_BITS:
+            self._lacked |= {
+                key for key, flag in ((tube, NodeFlag.LOWER_UNTOLD), (-tube, NodeFlag.DRIVE_UNTOLD)) if bits & flag
+            }
         if before != (self._lowers[tube], self._drives.get(tube)):
             self.revision += 1
             self.version += bool(self.joints)  # where an angle stands it matters what the node knows of it
@@ -104,6 +110,11 @@ class SetupBook:
         """Whether a node was told the angle of a joint; None where none has said so."""
         upper, lower = pair
         return self._drives.get(lower) if upper == DRIVE else self._lowers.get(upper)
+
+    def was_untold(self, pair: Pair) -> bool:
+        """Whether a node has said once that it was not told the angle of a joint, or has not spoken yet."""
+        upper, lower = pair
+        return self.node_knows(pair) is None or (-lower if upper == DRIVE else upper) in self._lacked
 
     def joints_of(self, tubes: Sequence[int]) -> list[Pair]:
         """Joints that surveys rest on: those of the string (tubes from the top down), and each to the drive head."""

@@ -14,13 +14,12 @@ from itertools import pairwise
 
 from groundstation.service.setup.setup_book import Pair, SetupBook
 from groundstation.service.setup.setup_items import JOINT_STD
-from groundstation.service.setup.told_value import DRIVE, ToldValue
+from groundstation.service.setup.told_value import DRIVE
 from groundstation.survey.bearings import wrap_azimuth
 from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
 from telemetry.frozen import replace
 from telemetry.messages import SurveyMeasurement
 
-LARGEST_VAR = 100.0  # rad^2, as a message says it
 UNTOLD_FROM = 0.5  # part of the variance of any yaw from which on an angle above a node was not told
 
 
@@ -40,16 +39,24 @@ def corrected_measurement(
     above : tubes above its own, lowest first; None where the order of the string is not known
     """
     turn, var = book.north, measurement.systematic_var
-    if above is not None and book.joints:
+    if above is not None and (book.joints or is_any_yaw(var)):
         by_joints, var = corrected_yaw(var, chain_of(measurement.tube, above), book)
         turn += by_joints
     if turn == 0.0 and var == measurement.systematic_var:
         return measurement
-    return replace(measurement, yaw=float(wrap_azimuth(measurement.yaw + turn)), systematic_var=min(var, LARGEST_VAR))
+    return replace(measurement, yaw=float(wrap_azimuth(measurement.yaw + turn)), systematic_var=var)
+
+
+def is_any_yaw(systematic_var: float) -> bool:
+    """Whether the systematic variance (rad^2) of a yaw says that an angle above it was not told."""
+    return systematic_var >= UNTOLD_FROM * UNKNOWN_YAW_VAR
 
 
 def corrected_yaw(systematic_var: float, chain: Sequence[Pair], book: SetupBook) -> tuple[float, float]:
     """By what a yaw is to be turned (rad), and its systematic variance (rad^2) then.
+
+    A node bounds the sum of angles that may be any by one of them. Here each joint counts by itself, so that what a
+    tube has more than the one above it is the joint between them.
 
     Parameters
     ----------
@@ -57,23 +64,18 @@ def corrected_yaw(systematic_var: float, chain: Sequence[Pair], book: SetupBook)
     chain : joints from the tube up to the drive head
     """
     told = {pair: book.joints[pair] for pair in chain if pair in book.joints}
-    if not told:
-        return 0.0, systematic_var
+    again = [known for known in told.values() if known.used is not None]
+    turn, var = sum(known.correction for known in again), sum(known.sigma**2 for known in again)
+    if not is_any_yaw(systematic_var):
+        return turn, systematic_var + var
     lacked = {pair: known for pair, known in told.items() if known.used is None}
-    again = {pair: known for pair, known in told.items() if known.used is not None}
-    turn, var = sum(known.correction for known in again.values()), systematic_var
-    if systematic_var >= UNTOLD_FROM * UNKNOWN_YAW_VAR:
-        turn += sum(known.correction for known in lacked.values())
-        if is_whole(chain, lacked, book):
-            marks = sum(book.node_knows(pair) is True for pair in chain)  # their errors are lost in that of any yaw
-            var = max(systematic_var - UNKNOWN_YAW_VAR, 0.0) + marks * JOINT_STD**2
-            var += sum(known.sigma**2 for known in lacked.values())
-    return turn, var + sum(known.sigma**2 for known in again.values())
-
-
-def is_whole(chain: Sequence[Pair], lacked: dict[Pair, ToldValue], book: SetupBook) -> bool:
-    """Whether every joint of a chain is known: to its node, or told in its place."""
-    return all(pair in lacked or book.node_knows(pair) is True for pair in chain)
+    untold = [pair for pair in chain if pair not in told and book.was_untold(pair)]
+    if not lacked and not untold:
+        return turn, systematic_var + var  # by what the nodes say now none lacked an angle: it is not known which did
+    marks = len(chain) - len(lacked) - len(untold)  # told to their nodes; their own errors are lost under the bound
+    var += max(systematic_var - UNKNOWN_YAW_VAR, 0.0) + marks * JOINT_STD**2 + len(untold) * UNKNOWN_YAW_VAR
+    turn += sum(known.correction for known in lacked.values())
+    return turn, var + sum(known.sigma**2 for known in lacked.values())
 
 
 def depth_shift(tube: int, tubes: Sequence[int], tube_length: float, book: SetupBook) -> float:
