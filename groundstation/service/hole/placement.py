@@ -91,8 +91,10 @@ class Placement:
                 fused.append(corrected_measurement(m, chain, self._setup))
                 above.append(chain)
                 places.append(place)
-                shift = depth_shift(m.tube, self._string.tubes, self._tube_length, self._setup)
-                depths.append(max(mds[place] + shift, 0.0))
+                md = mds[place]
+                if self._setup.moves_depths:
+                    md += depth_shift(m.tube, self._string.tubes, self._tube_length, self._setup)
+                depths.append(max(md, 0.0))
         found: list[Found | None] = [None] * len(measurements)
         if fused:
             resolved = self._resolver.resolve_measurements(fused, depths, above)

@@ -36,6 +36,7 @@ class SetupBook:
     entries : everything that orders told, the oldest first
     joints, lengths : what stands of the joints, and of the tubes
     north, stick_up : angle (rad) and height (m) that stand; zero where none does
+    moves_depths : whether lengths or the stick-up were told
     version : grows with everything by which surveys mean something else
     revision : grows with everything that is entered, or that a node says anew of what it was told
     """
@@ -48,6 +49,7 @@ class SetupBook:
         self.joints: dict[Pair, ToldValue] = {}
         self.lengths: dict[int, ToldValue] = {}
         self.north = self.stick_up = 0.0
+        self.moves_depths = False
         self._lowers: dict[int, bool] = {}  # by tube, whether its node was told the angle of the joint below it
         self._drives: dict[int, bool] = {}  # and that of the joint to the drive head, of each that hung from it
         self._lacked: set[int] = set()  # tubes whose joint below was not told once, less than zero: to the drive head
@@ -90,6 +92,7 @@ class SetupBook:
         self.north = 0.0 if north is None else north.values[0]
         self.stick_up = 0.0 if stick_up is None else stick_up.values[0]
         self.lengths = {int(told.subject): told for told in standing if told.kind is SetupKind.LENGTH}
+        self.moves_depths = bool(self.lengths) or self.stick_up != 0.0
 
     def on_flags(self, tube: int, hops: int, flags: NodeFlag) -> None:
         """A node says, in a state or a measurement, which angles it was not told."""

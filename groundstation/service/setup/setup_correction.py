@@ -20,7 +20,7 @@ from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
 from telemetry.frozen import replace
 from telemetry.messages import SurveyMeasurement
 
-UNTOLD_FROM = 0.5  # part of the variance of any yaw from which on an angle above a node was not told
+ANY_YAW = 0.5 * UNKNOWN_YAW_VAR  # rad^2, systematic variance from which on an angle above a node was not told
 
 
 def chain_of(tube: int, above: Sequence[int]) -> list[Pair]:
@@ -39,17 +39,12 @@ def corrected_measurement(
     above : tubes above its own, lowest first; None where the order of the string is not known
     """
     turn, var = book.north, measurement.systematic_var
-    if above is not None and (book.joints or is_any_yaw(var)):
+    if above is not None and (book.joints or var >= ANY_YAW):
         by_joints, var = corrected_yaw(var, chain_of(measurement.tube, above), book)
         turn += by_joints
     if turn == 0.0 and var == measurement.systematic_var:
         return measurement
     return replace(measurement, yaw=float(wrap_azimuth(measurement.yaw + turn)), systematic_var=var)
-
-
-def is_any_yaw(systematic_var: float) -> bool:
-    """Whether the systematic variance (rad^2) of a yaw says that an angle above it was not told."""
-    return systematic_var >= UNTOLD_FROM * UNKNOWN_YAW_VAR
 
 
 def corrected_yaw(systematic_var: float, chain: Sequence[Pair], book: SetupBook) -> tuple[float, float]:
@@ -66,7 +61,7 @@ def corrected_yaw(systematic_var: float, chain: Sequence[Pair], book: SetupBook)
     told = {pair: book.joints[pair] for pair in chain if pair in book.joints}
     again = [known for known in told.values() if known.used is not None]
     turn, var = sum(known.correction for known in again), sum(known.sigma**2 for known in again)
-    if not is_any_yaw(systematic_var):
+    if systematic_var < ANY_YAW:
         return turn, systematic_var + var
     lacked = {pair: known for pair, known in told.items() if known.used is None}
     untold = [pair for pair in chain if pair not in told and book.was_untold(pair)]
