@@ -130,6 +130,8 @@ def test_what_may_be_one_thing_or_another_makes_the_verdict_unknown(tmp_path: Pa
     measurements = passes(5, lambda stop, station: 3.0 if stop == 5 and station == 3 else 1.0)
     model = knowing(tmp_path, measurements, 5, **ADJUSTED, mount_std_deg=0.01)
     assert model.hole.examined is not None
-    doubts = [doubt for doubt, _ in known_of(model.config, model.string, model.hole, model.rig_alarms).doubts]
+    doubts = [
+        doubt for doubt, _ in known_of(model.config, model.string, model.setup, model.hole, model.rig_alarms).doubts
+    ]
     assert (VerdictDoubt.CONTRADICTION in doubts) == bool(model.hole.examined.doubts)
     assert blamed(model)

@@ -18,6 +18,7 @@ from itertools import pairwise
 import numpy as np
 
 from groundstation.config import GroundConfig
+from groundstation.service.setup.setup_items import MOUNT_TILT_STD
 from groundstation.survey.adjustment.looks import StringPrior
 from groundstation.survey.adjustment.run_of_stops import JOINT, MOUNT, TurnCauses
 
@@ -83,7 +84,8 @@ class Hanging:
 def prior_of_string(config: GroundConfig, count: int, causes: TurnCauses) -> StringPrior:
     """Prior of so many tubes, whose turns have these causes."""
     bias = math.radians(config.accelerometer_bias_std_deg) * config.gravity
-    tilt = math.radians(config.mount_tilt_std_deg)
+    told = config.mount_tilt_std_deg
+    tilt = MOUNT_TILT_STD if told is None else math.radians(told)
     cov = causes.cov
     return StringPrior(
         np.full(count, max(bias, LEAST_STD)),

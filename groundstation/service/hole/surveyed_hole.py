@@ -23,6 +23,8 @@ from groundstation.service.hole.hole_adjustment import HoleAdjustment, direction
 from groundstation.service.hole.movement import Moved, Movement
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
+from groundstation.service.setup.setup_book import SetupBook
+from groundstation.service.setup.setup_priors import collar_direction
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import SharedErrors
@@ -41,30 +43,38 @@ class SurveyedHole:
     ----------
     config : design, tolerance and weighting
     shared : the errors that its readings share
+    setup : what was told of the rig, the direction at the collar among it
     """
 
-    def __init__(self, config: GroundConfig, shared: SharedErrors) -> None:
+    def __init__(self, config: GroundConfig, shared: SharedErrors, setup: SetupBook) -> None:
         self._config = config
         self._shared = shared
+        self._setup = setup
         self._design = config.design
+        self.version = 0  # grows with every survey
+        self.newest = 0  # number of the measurement that came last, revisions included
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        """Forget every stop; they are added again, as they are by what was told of the rig since."""
+        self.version += 1
+        self._collar = collar_direction(self._config, self._setup)
         self._stops = ResolvedStops()
         self._station_of: list[SurveyStation] = []  # of each of its rows
         self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
         self._stations: list[SurveyStation] = []
         self._movement = Movement(self._stops, self._station_of)
-        self._adjustment = HoleAdjustment(config, shared)
+        self._adjustment = HoleAdjustment(self._config, self._shared)
         self._examined: tuple[int, ExaminedHole | None] = (0, None)  # of the version that it is of
         self._adjusted: dict[float, Direction] = {}  # by the depth (m) of a station, where the hole is adjusted
         self._alarms = AlarmList()
         self._history = History()
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
-        self._trajectory = Trajectory(collar=config.collar, keeps_columns=False)
+        self._trajectory = Trajectory(collar=self._collar, keeps_columns=False)
         self._deviations = self._deviate()
         self._projection: Deviation | None = None
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
         self._newest_at = -math.inf  # s, rig time of the newest survey
-        self.version = 0  # grows with every survey
-        self.newest = 0  # number of the measurement that came last, revisions included
 
     def add_stop(self, stops: ResolvedStops, row: int, epoch: int) -> bool:
         """Take a stop with rig time of an epoch; a revision of one that is known takes its place, unless it is older.
@@ -134,6 +144,11 @@ class SurveyedHole:
         self.settle()
         return self._trajectory
 
+    @property
+    def collar(self) -> Direction:
+        """Direction at the collar as well as it is known."""
+        return self._collar
+
     def direction_of(self, station: SurveyStation) -> Direction:
         """Direction of the hole at a station, the transport of the string in it."""
         self.settle()
@@ -156,7 +171,7 @@ class SurveyedHole:
             place = {id(one): number for number, one in enumerate(below, 1)}
             station_of_row = np.array([place.get(id(one), 0) for one in self._station_of], np.intp)
             mds = np.array([one.md for one in below])
-            found = self._adjustment.examine(self._stops, station_of_row, mds, self._config.collar)
+            found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar)
             self._examined = self.version, found
         return self._examined[1]
 
@@ -169,7 +184,7 @@ class SurveyedHole:
         """Direction of a station without transport; that of the collar is the collar's where the hole is adjusted."""
         if not self.is_adjusted:
             return station.fused(self._config.weighting)
-        return self._adjusted.get(station.md, self._config.collar)
+        return self._adjusted.get(station.md, self._collar)
 
     @property
     def has_transport(self) -> bool:
@@ -252,7 +267,7 @@ class SurveyedHole:
             return []
         mds, directions = zip(*measured, strict=True)
         places = self._shared.transport_places(len(measured) + 1)
-        self._carried = dict(zip(mds, carry_directions(self._config.collar, directions, places), strict=True))
+        self._carried = dict(zip(mds, carry_directions(self._collar, directions, places), strict=True))
         return [(md, carried.direction) for md, carried in self._carried.items()]
 
     def _deviate(self) -> Deviations:
