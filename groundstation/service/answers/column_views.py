@@ -48,7 +48,7 @@ def answer_column(k: RigModel, p: Parameters) -> ColumnAnswer:
             radius_m=config.design.radius,
             tolerance=config.design.tolerance.name,
         ),
-        stations=filled_answers(ColumnDeviation, map(deviation_values, rows)),
+        stations=[column_deviation(row) for row in rows],
         worst=column_deviation(max(rows, key=lambda row: row.ratio)),
         projection=None if end is None else column_deviation(end),
         dominant=None if moment is not None else _dominant(k),
@@ -106,23 +106,17 @@ def _dominant(k: RigModel) -> DominantAngle | None:
 
 def column_deviation(d: Deviation) -> ColumnDeviation:
     """One deviation."""
-    return ColumnDeviation(**deviation_values(d))
-
-
-def deviation_values(d: Deviation) -> dict[str, Any]:
-    """Fields of one deviation."""
-    north, east = d.offset.tolist()
-    size = d.size
-    return {
-        "md_m": round(d.md, 6),
-        "along_m": d.along,
-        "north_cm": CM * north,
-        "east_cm": CM * east,
-        "deviation_cm": CM * size,
-        "sigma_cm": CM * d.std,
-        "deviation_percent": 100.0 * size / d.along if d.along > 0.0 else 0.0,
-        "direction_deg": math.degrees(math.atan2(east, north)) % 360.0,
-        "limit_cm": CM * d.limit,
-        "used_percent": 100.0 * used_share(size, d.limit),
-        "level_percent": round(100.0 * d.level),
-    }
+    size, (north, east) = d.size, d.offset.tolist()
+    return ColumnDeviation(
+        md_m=round(d.md, 6),
+        along_m=d.along,
+        north_cm=CM * north,
+        east_cm=CM * east,
+        deviation_cm=CM * size,
+        sigma_cm=CM * d.std,
+        deviation_percent=100.0 * size / d.along if d.along > 0.0 else 0.0,
+        direction_deg=math.degrees(math.atan2(east, north)) % 360.0,
+        limit_cm=CM * d.limit,
+        used_percent=100.0 * used_share(size, d.limit),
+        level_percent=round(100.0 * d.level),
+    )
