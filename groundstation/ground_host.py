@@ -69,6 +69,7 @@ def run_ground(
 
 def load_kernels() -> None:
     """Compile what surveys are computed with, or load it, before it says that it lives: no question waits for that."""
+    from groundstation.survey.adjustment.warm_adjustment import warm_adjustment
     from groundstation.survey.path.kernels import curvature_filter, frame_along, mixture_chances
     from groundstation.survey.well.kernels import position_errors
     from node.kernels.arithmetic.compiler import leave_blas_out
@@ -76,6 +77,7 @@ def load_kernels() -> None:
     leave_blas_out()
     for kernels in (position_errors, frame_along, curvature_filter, mixture_chances):
         kernels.warm_up()
+    warm_adjustment()
 
 
 def start_ground_process(config: GroundConfig) -> GroundProcess:

@@ -10,6 +10,7 @@ import node.process.node_host
 import sim.rig.bus_stepper
 import sim.rig.scheduler
 import sim.world.world
+from groundstation.survey.adjustment.warm_adjustment import warm_adjustment
 from groundstation.survey.path.kernels import curvature_filter, frame_along, mixture_chances
 from groundstation.survey.well.kernels import position_errors
 from node.kernels.arithmetic.compiler import leave_blas_out
@@ -22,6 +23,7 @@ position_errors.warm_up()
 frame_along.warm_up()
 curvature_filter.warm_up()
 mixture_chances.warm_up()
+warm_adjustment()
 # a collection in a child writes into every object that it looks at: 45 MB of shared pages would become its own
 gc.collect()
 gc.freeze()

@@ -50,6 +50,8 @@ class VerdictDoubt(enum.StrEnum):
     CLOCK = "clock"
     YAW = "yaw"
     UNCERTAIN = "uncertain"
+    SETUP = "setup"
+    CONTRADICTION = "contradiction"
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from groundstation.errors import SelectorError
+from groundstation.service.answers.shapes.adjustment_shapes import AdjustmentAnswer
 from groundstation.service.answers.shapes.alarm_shapes import AlarmsAnswer
 from groundstation.service.answers.shapes.answer_fields import Fields, fields_of_answer, object_schema
 from groundstation.service.answers.shapes.column_shapes import ColumnAnswer, HistoryAnswer, Verdict
@@ -22,6 +23,7 @@ from groundstation.service.answers.shapes.hole_shapes import (
     UncertaintyAnswer,
 )
 from groundstation.service.answers.shapes.order_shapes import Order, OrdersAnswer, RecalibrationAnswer
+from groundstation.service.answers.shapes.setup_shapes import SetupAnswer
 from groundstation.service.answers.shapes.string_shapes import (
     AnswerHeader,
     ChangesAnswer,
@@ -131,6 +133,13 @@ ANSWERS: Final = {
             on_page=True,
         ),
         AnswerKey(
+            "adjustment",
+            AdjustmentAnswer,
+            "what the tubes say about each other: how well all surveys fit, what is wrong and with what, sensors as "
+            "learnt, of what the sigma at the toe is made, what would be found, the angle of the next stop",
+            published=False,
+        ),
+        AnswerKey(
             "column",
             ColumnAnswer,
             "deviation from the design, projected to the target; ?moment=3",
@@ -149,6 +158,12 @@ ANSWERS: Final = {
             "wall",
             WallAnswer,
             "joints of this hole with its neighbours: thickness, probability of an opening, extra columns",
+            on_page=True,
+        ),
+        AnswerKey(
+            "setup",
+            SetupAnswer,
+            "what is known of the rig, by whom and how well, what each item costs at the toe, and what is missing",
             on_page=True,
         ),
         AnswerKey("alarms", AlarmsAnswer, "tolerance and rig alarms, stations where the hole moved", on_page=True),

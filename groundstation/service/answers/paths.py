@@ -10,12 +10,14 @@ from typing import Any, Final
 
 from groundstation.errors import SelectorError
 from groundstation.service.answers import (
+    adjustment_views,
     alarm_views,
     column_views,
     hole_views,
     measurement_views,
     order_views,
     recalibration_views,
+    setup_views,
     string_views,
     verdict_views,
     wall_views,
@@ -37,12 +39,14 @@ from groundstation.service.answers.streamed_rows import Parameters
 
 # each tells ``MAKERS`` of its views when it is imported
 VIEWS: Final[tuple[ModuleType, ...]] = (
+    adjustment_views,
     alarm_views,
     column_views,
     hole_views,
     measurement_views,
     order_views,
     recalibration_views,
+    setup_views,
     string_views,
     verdict_views,
     wall_views,
@@ -69,7 +73,7 @@ class AnsweredPath:
             text = k.texts.text_of(self.answer.path, lambda: json_of(self.view(k, p)))
         else:
             text = json_of(self.view(k, p))
-        return json_of(answer_header(k))[:-1] + b"," + text[1:]
+        return b"".join((json_of(answer_header(k))[:-1], b",", memoryview(text)[1:]))
 
     def view(self, k: RigModel, p: Parameters) -> Any:
         """What stands behind the header."""

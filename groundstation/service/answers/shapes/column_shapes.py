@@ -97,7 +97,6 @@ class HistoryMoment:
     deviation_cm: Annotated[float, "of the end, or before that is known of the worst station"]
     limit_cm: Annotated[float, "tolerance there"]
     used_percent: Annotated[float, "of the tolerance"]
-    within_percent: Annotated[float | None, "chance of ending within it; null before the end is foreseen"]
 
 
 @answer_class
