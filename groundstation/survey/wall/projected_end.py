@@ -113,7 +113,7 @@ class WayAhead:
 
     def deviation(self, part: float, mixture: NormalMixture) -> Deviation:
         """Mean and covariance of that mixture as a deviation."""
-        along = float((self.offset + part * self.rest * self.tangent) @ self.design.axis)
+        along = self.design.length - (1.0 - part) * (self.design.length - float(self.offset @ self.design.axis))
         md = self.md + part * self.rest
         return Deviation(md, along, mixture.mean, mixture.cov, self.design.tolerance.at(along))
 
