@@ -21,7 +21,8 @@ Array = npt.NDArray[np.float64]
 OFFSET, DIRECTION, CURVATURE = range(3)  # of the state of one axis
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)  # of a smooth integrand: exact to rounding up to forty lengths
 SMALL = 0.5  # of length over correlation length, below which the response is summed as a series
-TERMS = 14  # of that series
+EXPONENTS = np.arange(2.0, 14.0)  # of that series
+COEFFICIENTS = np.array([(-1.0) ** k / math.factorial(k) for k in range(2, 14)])
 
 
 @lru_cache(maxsize=4096)
@@ -52,6 +53,6 @@ def curvature_response(lengths: Array, correlation_length: float) -> Array:
     left = np.exp(-u)
     direction = -np.expm1(-u)
     powers = np.where(u < SMALL, u, 0.0)
-    series = sum((-1.0) ** k * powers**k / math.factorial(k) for k in range(2, TERMS))  # e^-u - 1 + u
+    series = powers[:, None] ** EXPONENTS @ COEFFICIENTS  # e^-u - 1 + u
     offset = np.where(u < SMALL, series, u - direction)
     return np.stack([correlation_length**2 * offset, correlation_length * direction, left], axis=1)

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.path.curvature_process import curvature_response, process_step
+from groundstation.survey.path.curvature_process import process_step
 from groundstation.survey.path.curvature_tendency import CurvatureTendency
 from groundstation.survey.path.normal_mixture import NormalMixture
 
 Array = npt.NDArray[np.float64]
 PLACES, SHARES = np.polynomial.legendre.leggauss(6)  # of a jump ahead, in parts of the way
-ENDLESS = 1e6  # m, over which a jump is kept
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +70,7 @@ class PathAhead:
         prior, weights = self.tendency.prior, self.tendency.weights.ravel()
         jumped = float(self.tendency.chance_of_jump(distance))
         left = 0.5 * distance * (1.0 - PLACES)
-        responses = curvature_response(left, ENDLESS)[:, place]
+        responses = 0.5 * left**2 if place == 0 else left
         whole = NormalMixture(weights, means, covs)
         stds = np.multiply.outer(prior.jumps, responses).ravel()
         shares = np.multiply.outer(prior.jump_shares, 0.5 * SHARES).ravel()
