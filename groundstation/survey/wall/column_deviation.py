@@ -85,6 +85,16 @@ def parse_tolerance(name: str) -> Tolerance:
     return Tolerance(name, start, growth)
 
 
+@dataclass(frozen=True, slots=True)
+class DesignEnd:
+    """Where a design ends: the plane across it there is what a hole is projected to."""
+
+    point: Array  # (3,) m, in the frame of the trajectory
+    tangent: Array  # (3,) unit vector on from there
+    across: Array  # (2, 3) unit vectors in the plane; north and east for a vertical end
+    limit: float  # m
+
+
 @dataclass(frozen=True)  # with a dictionary, for what is worked out once
 class ColumnDesign:
     """Axis of a column and what it is to become."""
@@ -113,6 +123,12 @@ class ColumnDesign:
             [[math.cos(self.azimuth), -math.sin(self.azimuth)], [math.sin(self.azimuth), math.cos(self.azimuth)]]
         )
         return np.asarray(turn @ np.stack([a, b]))
+
+    @cached_property
+    def end(self) -> DesignEnd:
+        """Target of the column."""
+        point = np.array(self.head) + self.length * self.axis
+        return DesignEnd(point, self.axis, self.across, self.tolerance.at(self.length))
 
 
 @dataclass(frozen=True, slots=True)
