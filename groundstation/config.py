@@ -13,11 +13,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from groundstation.errors import ConfigurationError
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction, known_direction
+from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.wall.column_deviation import PRESETS, ColumnDesign
+from groundstation.survey.well.depth_errors import DepthErrors
 from telemetry import keys
 
 SENSOR_BIAS_DEG = 0.06  # of an uncalibrated accelerometer, as a tilt: 1 mg
 Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class GroundConfig(BaseModel):
@@ -31,6 +34,12 @@ class GroundConfig(BaseModel):
     key_file: Path | None = Field(None, description="key of the rig; without one no parameter block is uploaded")
     keys: Path | None = Field(None, description="keys of the base, file or folder; without them everybody is believed")
     tube_length: Positive = Field(2.0, description="m, of every tube of the tally")
+    tube_length_std: NotNegative = Field(1e-3, description="m, of the length of each tube")
+    depth_scale_std: NotNegative = Field(5.6e-4, description="m/m, of the depth of the bit")
+    depth_offset_std: NotNegative = Field(0.01, description="m, of the stick-up")
+    depth_reading_std: NotNegative = Field(2e-3, description="m, of each reading of the depth")
+    curvature_std_deg_per_m: NotNegative = Field(0.15, description="by which the path between stations wanders")
+    curvature_length: Positive = Field(10.0, description="m, over which a curvature of the path is forgotten")
     gravity: Positive = Field(9.81, description="m/s^2, of the site")
     accelerometer_bias_std_deg: float = Field(
         SENSOR_BIAS_DEG, ge=0.0, description="as a tilt; 0.002 where every sensor is calibrated"
@@ -66,6 +75,16 @@ class GroundConfig(BaseModel):
     def url(self) -> str:
         """Database to use."""
         return self.database_url or f"sqlite:///{self.folder / 'ground.sqlite'}"
+
+    @property
+    def depth_errors(self) -> DepthErrors:
+        """Errors of measured depths."""
+        return DepthErrors(self.depth_scale_std, self.depth_offset_std, self.tube_length_std, self.depth_reading_std)
+
+    @property
+    def wander(self) -> LegWander:
+        """Curvature of the path between the stations."""
+        return LegWander(math.radians(self.curvature_std_deg_per_m), self.curvature_length)
 
     @property
     def collar(self) -> Direction:

@@ -78,15 +78,16 @@ class Placement:
 
         None for each that is not fused.
         """
-        fused, above, places = [], [], []
+        fused, above, below, places = [], [], [], []
         for place, m in enumerate(measurements):
             if trust_of(m.flags) not in NEVER_FUSED:
                 fused.append(m)
                 above.append(self._string.tally.above(m.tube, m.hops))
+                below.append(self._string.tally.below(m.tube))
                 places.append(place)
         found: list[Found | None] = [None] * len(measurements)
         if fused:
-            resolved = self._resolver.resolve_measurements(fused, [mds[place] for place in places], above)
+            resolved = self._resolver.resolve_measurements(fused, [mds[place] for place in places], above, below)
             for place, one in zip(places, resolved, strict=True):
                 found[place] = one
         return found

@@ -23,10 +23,11 @@ from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
-from groundstation.survey.fusion.shared import SharedErrors
+from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
 from groundstation.survey.fusion.survey_trust import Trust
 from groundstation.survey.fusion.transport import Carried, carry_directions
 from groundstation.survey.wall.column_deviation import Deviation, Deviations, axis_deviations, project_to_target
+from groundstation.survey.well.depth_errors import StationDepth, mean_depth
 from groundstation.survey.well.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
@@ -53,7 +54,7 @@ class SurveyedHole:
         self._alarms = AlarmList()
         self._history = History()
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
-        self._trajectory = Trajectory(collar=config.collar, keeps_columns=False)
+        self._trajectory = Trajectory(collar=config.collar, wander=config.wander, keeps_columns=False)
         self._deviations = self._deviate()
         self._projection: Deviation | None = None
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
@@ -147,12 +148,18 @@ class SurveyedHole:
         return (0.0, 0.0) if carried is None else (carried.gamma, carried.std)
 
     @property
-    def variances(self) -> Array:
-        """Variances (n, kinds, 3) of the positions along the trajectory (m^2) by what their stations share.
+    def variances(self) -> dict[str, Array]:
+        """Variances (n, 3) of the positions along the trajectory (m^2) by their sources, which add up to the whole.
 
         They are worked out when they are asked for: a start goes through hundreds of stops and shows none of them.
         """
-        return np.concatenate([self._shared.variances(columns) for columns in self.trajectory.columns()])
+        drawn = self.trajectory
+        shared = np.concatenate([self._shared.variances(columns) for columns in drawn.columns()])
+        found = dict(zip(KIND_NAMES, np.moveaxis(shared, 1, 0), strict=True))
+        found["depth"] = found["depth"] + np.diagonal(drawn.depth_covs, axis1=1, axis2=2)
+        found["path"] = np.diagonal(drawn.path_covs, axis1=1, axis2=2)
+        rest = np.diagonal(drawn.covs, axis1=1, axis2=2) - sum(found.values())
+        return {"random": np.maximum(rest, 0.0)} | found
 
     def place_of(self, station: SurveyStation) -> int:
         """Place of a station in the trajectory; that of the collar for one at its depth."""
@@ -187,7 +194,7 @@ class SurveyedHole:
             SurveyStation.add_newest(grown, newest)
 
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
-        self._trajectory.put(self._directions(changed))
+        self._trajectory.put(self._directions(changed), {one.md: self._depth_of(one) for one in changed})
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)
         if worst is None:
@@ -212,6 +219,12 @@ class SurveyedHole:
         places = self._shared.transport_places(len(measured) + 1)
         self._carried = dict(zip(mds, carry_directions(self._config.collar, directions, places), strict=True))
         return [(md, carried.direction) for md, carried in self._carried.items()]
+
+    def _depth_of(self, station: SurveyStation) -> StationDepth:
+        """Error of the depth of a station."""
+        places = [self._stops.depth_places[row] for row in station.stops.rows]
+        config = self._config
+        return mean_depth(station.md, places, config.depth_errors, config.tube_length, self._shared.count)
 
     def _deviate(self) -> Deviations:
         """Deviations of the trajectory as it is drawn."""

@@ -1,18 +1,22 @@
 """From directions at measured depths to positions with their covariance, one station appended at a time.
 
 A station enters two legs, so its weight in the position is half their summed length, and half the last leg for the last
-station (the Jacobian of the balanced tangential method, used for every method as the industry's error model does).
-Its errors are kept by running sums in a compiled loop: appending costs the same however many stations there are, and
+station: the Jacobian of the balanced tangential method, used for every method as the industry's error model does. Of
+an arc that bends by b it leaves out b/3 along the hole and b^2/12 across it of what one leg makes of an error: of first
+order in the error it is right to first order in the bend, at 3 deg a leg to two hundredths along and to two parts in
+ten thousand across. An error of a depth, e, changes how long a leg is, and so moves what is below it along the leg,
+tau (e_k - e_(k-1)) with the leg's displacement a metre tau. What the path does between stations is each leg's own.
+Errors are kept by running sums in a compiled loop: appending costs the same however many stations there are, and
 where one changes, those below are drawn from the nearest mark above. What stations share may become more columns as the
 hole grows; the columns of a point are those known when it was added.
-Source: thesis 2.1-2.3 and eqs. I.1-I.12. Frame: north, east, down.
+Source: thesis 2.1-2.3 and eqs. I.1-I.12; Definition of the ISCWSA error model, revision 5. Frame: north, east, down.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import Final
@@ -24,7 +28,10 @@ from groundstation.errors import SurveyError
 from groundstation.survey.fusion.resolve import Direction, direction_angles
 from groundstation.survey.fusion.shared import Packed, add_shared_errors, packed_of
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
-from groundstation.survey.well.methods import OPPOSITE, Method, dogleg, leg_displacement, ratio_factor
+from groundstation.survey.path.leg_wander import LegWander
+from groundstation.survey.well.arcs import arc_displacements, bend_angles, turned_tangents
+from groundstation.survey.well.depth_errors import EXACT, StationDepth
+from groundstation.survey.well.methods import OPPOSITE, Method, leg_displacement
 
 Array = npt.NDArray[np.float64]
 BLOCK = 64  # stations from mark to mark
@@ -32,6 +39,9 @@ NONE: Final = Packed(np.zeros((2, 0)))
 UNKNOWN: Final = np.zeros((3, 0))
 NOTHING: Final = np.zeros(0)
 FROM_ZERO: Final = np.zeros(1, np.intp)
+STEADY: Final = LegWander(0.0, 1.0)  # a path that does what its arcs do
+ALL_EXACT: Final[Mapping[float, StationDepth]] = {}
+TURNED_BACK = math.radians(120.0)  # bend of one leg, beyond which it is no hole any more
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +62,11 @@ ROW: Final = np.dtype(
         ("own", np.float64, (3, 3)),  # covariance of the tangent that no other shares
         ("width", np.intp),  # shared columns that the direction knows
         ("count", np.intp),  # of them those that are kept
+        ("depths", np.intp),  # shared columns that are kept of its depth
+        ("depth_var", np.float64),  # m^2, of its depth, that no other shares
+        ("along", np.float64, 3),  # displacement of the leg above for a metre of it
+        ("kinks", np.float64, (3, 3)),  # m^2, what the own errors of the depths above come to
+        ("path", np.float64, (3, 3)),  # m^2, what the path between the stations above comes to
         ("position", np.float64, 3),
         ("cov", np.float64, (3, 3)),
     ]
@@ -87,24 +102,28 @@ class Trajectory:
     method : of the legs
     collar : direction at the first depth, known: vertical by default
     start_md : m
+    wander : of the path between the stations
     keeps_columns : whether every point keeps its shared columns, which of a string of fifty tubes are 750 numbers
     """
 
     def __init__(
         self,
-        method: Method = Method.BALANCED_TANGENTIAL,
+        method: Method = Method.MINIMUM_CURVATURE,
         collar: Direction | None = None,
         start_md: float = 0.0,
         *,
+        wander: LegWander = STEADY,
         keeps_columns: bool = True,
     ) -> None:
-        self._method = method
+        self.method = method
+        self._wander = wander
         self._keeps_columns = keeps_columns
         first = collar or Direction(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
         self._rows = np.zeros(FEWEST, ROW)
         self._directions: list[Direction] = []  # of the collar and every station
         self._columns: list[Packed] = []  # (2, s), of each
         self._down: list[Array] = []  # and what those come to in the vertical, (c,) of those that are kept
+        self._depths: list[StationDepth] = []
         self._insert(0, start_md, first)
         self._direct([0])
         self._kept = [UNKNOWN]  # shared columns of every point that is drawn
@@ -142,7 +161,25 @@ class Trajectory:
         """Covariances (n, 3, 3) of the positions, m^2."""
         return np.asarray(self._rows["cov"][: len(self)])
 
-    def append(self, md: float, direction: Direction) -> TrajectoryPoint:
+    @property
+    def path_covs(self) -> Array:
+        """Covariances (n, 3, 3), m^2, that the path between the stations makes of ``covs``."""
+        return np.asarray(self._rows["path"][: len(self)])
+
+    @property
+    def depth_covs(self) -> Array:
+        """Covariances (n, 3, 3), m^2, that the own errors of depths make of ``covs``; what they share has columns."""
+        rows = self._rows[: len(self)]
+        return np.asarray(rows["kinks"] + last_depths(rows))
+
+    @property
+    def turned_back(self) -> list[float]:
+        """Depths (m) of the stations that point back against the one above: the hole is not what is drawn there."""
+        tangents = self._rows["tangent"][: len(self)]
+        bends = bend_angles(tangents[:-1], tangents[1:])
+        return [float(md) for md in self.md[1:][bends > TURNED_BACK]]
+
+    def append(self, md: float, direction: Direction, depth: StationDepth = EXACT) -> TrajectoryPoint:
         """Add the station at ``md`` (m).
 
         Raises
@@ -150,35 +187,47 @@ class Trajectory:
         SurveyError
             When the depth does not grow, or the two directions are opposite.
         """
-        self.extend([(md, direction)])
+        self.extend([(md, direction)], {md: depth})
         return self[-1]
 
-    def extend(self, stations: Sequence[tuple[float, Direction]]) -> None:
+    def extend(
+        self, stations: Sequence[tuple[float, Direction]], depths: Mapping[float, StationDepth] = ALL_EXACT
+    ) -> None:
         """Add stations (m, direction); the same bit for bit as one after the other, and several times as fast.
+
+        Parameters
+        ----------
+        stations : in the order of depth
+        depths : errors of their depths, by these; those that are missing are exact
 
         Raises
         ------
         SurveyError
             When a depth does not grow, or two directions are opposite; then none is added.
         """
-        depths = [float(self._rows["md"][len(self) - 1]), *(md for md, _ in stations)]
-        for before, md in itertools.pairwise(depths):
+        mds = [float(self._rows["md"][len(self) - 1]), *(md for md, _ in stations)]
+        for before, md in itertools.pairwise(mds):
             if not 0.0 < md - before < math.inf:
                 raise SurveyError(f"trajectory: expected a depth beyond {before:g} m, got {md:g} m")
+        self._check_bends(mds, [self._directions[-1], *(direction for _, direction in stations)])
         known = len(self)
         for place, (md, direction) in enumerate(stations, known):
             self._insert(place, md, direction)
+            self._depths[place] = depths.get(md, EXACT)
         self._direct(range(known, len(self)))
-        try:
-            self._draw(known)
-        except SurveyError:
-            del self._directions[known:], self._columns[known:], self._down[known:]
-            raise
+        self._draw(known)
 
-    def put(self, stations: Iterable[tuple[float, Direction]]) -> None:
+    def put(
+        self, stations: Iterable[tuple[float, Direction]], depths: Mapping[float, StationDepth] = ALL_EXACT
+    ) -> None:
         """Put stations (m, direction) between the others, or in the place of those at the same depth.
 
-        What is above the first of them stays as it is; the whole is bit for bit as one that is drawn anew.
+        What is above the first of them stays as it is; the whole is bit for bit as one that is drawn anew. Directions
+        are taken as they come: a station that turns back is told by ``turned_back``.
+
+        Parameters
+        ----------
+        depths : errors of their depths, by these; those that are missing are exact
 
         Raises
         ------
@@ -197,10 +246,58 @@ class Trajectory:
             elif self._directions[place] is direction:
                 continue
             self._directions[place] = direction
+            self._depths[place] = depths.get(md, EXACT)
             changed.append(place)
         self._direct(changed)
         if changed:
             self._draw(changed[0])
+
+    def at(self, md: float) -> TrajectoryPoint:
+        """Point at a depth (m): on the arc between two stations, with its own covariance.
+
+        It is as one more station there would be whose direction is the share of the two around, and knows in addition
+        how far the path may have left the arc.
+
+        Raises
+        ------
+        SurveyError
+            When ``md`` is outside the trajectory.
+        """
+        first, last = float(self._rows["md"][0]), float(self._rows["md"][len(self) - 1])
+        if not first <= md <= last:
+            raise SurveyError(f"trajectory: expected a depth of {first:g}..{last:g} m, got {md:g} m")
+        place = int(np.searchsorted(self.md, md))
+        return self[place] if self._rows["md"][place] == md else self._between(place - 1, md)
+
+    def _between(self, k: int, md: float) -> TrajectoryPoint:
+        """Point between the station at a place and the next."""
+        upper, lower = self._rows[k], self._rows[k + 1]
+        leg = float(lower["md"] - upper["md"])
+        f = (md - float(upper["md"])) / leg
+        place, tangent = on_arc(upper["tangent"], lower["tangent"], lower["position"] - upper["position"], leg, f)
+        along = place / (f * leg)
+        sums = self._sums_at(k)
+        weights = (0.5 * (sums.length + leg * f * (2.0 - f)), 0.5 * leg * f * f)
+        by_depth = (upper["along"] - f * along, f * along)
+        shared, cov = sums.passed, sums.own + upper["kinks"] + upper["path"]
+        cov = cov + self._wander.variance(leg, f) * across_of(along)
+        for row, own, weight, moved in zip((upper, lower), (k, k + 1), weights, by_depth, strict=True):
+            cov = cov + weight**2 * row["own"] + float(row["depth_var"]) * np.outer(moved, moved)
+            shared = add_shared_errors(shared, weight * self._tangent_columns(own))
+            shared = add_shared_errors(shared, moved[:, None] * self._depths[own].columns.columns())
+        return TrajectoryPoint(md, tangent, upper["position"] + place, cov + shared @ shared.T, shared)
+
+    def _sums_at(self, place: int) -> TrajectorySums:
+        """Running sums at a station."""
+        begin = place - place % BLOCK
+        mark = self._marks[begin // BLOCK]
+        return mark if begin == place else self._follow(mark, begin, place, with_columns=False).sums
+
+    def _tangent_columns(self, place: int) -> Array:
+        """Shared columns (3, s) of the tangent at a station."""
+        packed = self._columns[place]
+        values = np.concatenate([packed.values, self._down[place][None]])
+        return Packed.of(packed.places, values, packed.width).columns()
 
     def columns(self) -> Iterator[Array]:
         """Shared columns (n, 3, s) of the points from the collar down, some at a time, as many as were known there."""
@@ -219,6 +316,7 @@ class Trajectory:
         self._directions.insert(place, direction)
         self._columns.insert(place, NONE)
         self._down.insert(place, NOTHING)
+        self._depths.insert(place, EXACT)
 
     def _direct(self, places: Sequence[int]) -> None:
         """Compute the rows at some places that depend on their own direction alone."""
@@ -233,8 +331,11 @@ class Trajectory:
         rows, at = self._rows, np.array(places)
         rows["tangent"][at] = tangents
         rows["own"][at] = jacobians @ np.array([one.cov for one in directions]) @ jacobians.transpose(0, 2, 1)
-        rows["width"][at] = [direction.width for direction in directions]
+        depths = [self._depths[place] for place in places]
+        rows["width"][at] = [max(one.width, own.columns.width) for one, own in zip(directions, depths, strict=True)]
         rows["count"][at] = [len(self._columns[place].places) for place in places]
+        rows["depths"][at] = [len(own.columns.places) for own in depths]
+        rows["depth_var"][at] = [own.own_var for own in depths]
 
     def _draw(self, first: int) -> None:
         """Compute the positions from a place on."""
@@ -245,15 +346,29 @@ class Trajectory:
             self._sums = self._marks[-1]
         end = len(self)
         rows = self._rows[begin:end]
-        rows["position"] = np.add.accumulate([rows["position"][0], *self._legs(rows)])
+        legs = self._legs(rows)
+        rows["position"] = np.add.accumulate([rows["position"][0], *legs])
+        self._go_along(rows, legs)
         followed = self._follow(self._sums, begin, end - 1, with_columns=self._keeps_columns)
-        rows["cov"][1:] = followed.covs
+        rows["cov"][1:] = followed.covs + (rows["path"] + rows["kinks"] + last_depths(rows))[1:]
         self._sums = followed.sums
         self._marks += followed.marks
         if self._keeps_columns:
             self._kept += itertools.chain.from_iterable(followed.runs)
         else:
             self._kept += [UNKNOWN] * (len(rows) - 1)
+
+    def _go_along(self, rows: npt.NDArray[np.void], legs: Array) -> None:
+        """Compute what depths and the path between stations come to, from the first of some rows on."""
+        lengths = np.diff(rows["md"])
+        rows["along"][1:] = legs / lengths[:, None]
+        bent = rows["along"][:-1] - rows["along"][1:]
+        kinks = rows["depth_var"][:-1, None, None] * (bent[:, :, None] * bent[:, None])
+        rows["kinks"] = np.add.accumulate([rows["kinks"][0], *kinks])
+        wander = np.array([self._wander.variance(leg) for leg in lengths.tolist()])
+        rows["path"] = np.add.accumulate(
+            [rows["path"][0], *(wander[:, None, None] * across_of(rows["along"][1:]))]
+        )
 
     def _follow(self, sums: TrajectorySums, begin: int, end: int, *, with_columns: bool) -> Followed:
         """Continue ``sums`` from one place to another."""
@@ -262,6 +377,7 @@ class Trajectory:
         )
 
         rows, columns = self._rows[begin : end + 1], self._columns[begin : end + 1]
+        depths = [own.columns for own in self._depths[begin : end + 1]]
         known = max(sums.passed.shape[1], int(rows["width"][0]))
         widths = np.maximum(np.maximum.accumulate(rows["width"][1:]), known)
         starts = np.concatenate([FROM_ZERO, rows["count"].cumsum()])
@@ -270,6 +386,10 @@ class Trajectory:
             np.concatenate([one.values for one in columns], axis=1),
             np.concatenate(self._down[begin : end + 1]),
         )
+        depth_starts = np.concatenate([FROM_ZERO, rows["depths"].cumsum()])
+        depth_places = np.concatenate([one.places for one in depths]).astype(np.intp, copy=False)
+        by_depth = np.concatenate([one.values[0] for one in depths])
+        alongs = rows["along"][1:].copy()
         legs = np.diff(rows["md"])
         ends = 0.5 * legs
         weights = ends.copy()  # of the station before each, which has both its legs now
@@ -282,7 +402,8 @@ class Trajectory:
         passed[:, : sums.passed.shape[1]] = sums.passed
         shared, covs = np.empty((count if with_columns else 0, 3, width)), np.empty((count, 3, 3))
         add_stations(
-            weights, ends, starts, places, lean, down, rows["own"].copy(), widths, passed, own,
+            weights, ends, starts, places, lean, down, rows["own"].copy(), rows["along"][:-1] - alongs, alongs,
+            depth_starts, depth_places, by_depth, widths, passed, own,
             int(marked[0]) if len(marked) else count, BLOCK, marks, own_marks, shared, covs,
         )  # fmt: skip
         return Followed(
@@ -297,17 +418,39 @@ class Trajectory:
 
     def _legs(self, rows: npt.NDArray[np.void]) -> Array:
         """Displacements (n, 3) from station to station."""
-        if self._method is Method.BALANCED_TANGENTIAL:
-            return np.asarray((0.5 * np.diff(rows["md"]))[:, None] * (rows["tangent"][:-1] + rows["tangent"][1:]))
-        return np.array([self._leg(*ends) for ends in itertools.pairwise(rows)])
+        upper, lower, lengths = rows["tangent"][:-1], rows["tangent"][1:], np.diff(rows["md"])
+        if self.method is Method.MINIMUM_CURVATURE:
+            return arc_displacements(lengths, upper, lower)
+        if self.method is Method.BALANCED_TANGENTIAL:
+            return np.asarray((0.5 * lengths)[:, None] * (upper + lower))
+        angles = [direction_angles(tangent[:2], float(tangent[2])) for tangent in rows["tangent"]]
+        return np.array(
+            [
+                leg_displacement(math, self.method, length, *before, *after)
+                for length, (before, after) in zip(lengths.tolist(), itertools.pairwise(angles), strict=True)
+            ]
+        )
 
-    def _leg(self, before: np.void, after: np.void) -> Array:
-        i1, a1 = direction_angles(before["tangent"][:2], float(before["tangent"][2]))
-        i2, a2 = direction_angles(after["tangent"][:2], float(after["tangent"][2]))
-        md, below = float(before["md"]), float(after["md"])
-        if self._method is Method.MINIMUM_CURVATURE and dogleg(math, i1, a1, i2, a2) > math.pi - OPPOSITE:
-            raise SurveyError(f"trajectory: the hole turns back on itself between {md:g} and {below:g} m")
-        return np.array(leg_displacement(math, self._method, below - md, i1, a1, i2, a2))
+    def _check_bends(self, mds: Sequence[float], directions: Sequence[Direction]) -> None:
+        """Refuse legs of which minimum curvature has no arc."""
+        if self.method is not Method.MINIMUM_CURVATURE:
+            return
+        tangents = tangents_of(directions)
+        for leg in np.flatnonzero(bend_angles(tangents[:-1], tangents[1:]) > math.pi - OPPOSITE):
+            above, below = mds[leg], mds[leg + 1]
+            raise SurveyError(f"trajectory: the hole turns back on itself between {above:g} and {below:g} m")
+
+
+def last_depths(rows: npt.NDArray[np.void]) -> Array:
+    """Covariance (n, 3, 3), m^2, that the own error of each row's depth makes of its position."""
+    along = rows["along"]
+    return np.asarray(rows["depth_var"][:, None, None] * (along[:, :, None] * along[:, None]))
+
+
+def across_of(along: Array) -> Array:
+    """Projections (..., 3, 3) on the planes across vectors (..., 3); on all of space of one that is zero."""
+    sizes = (along * along).sum(axis=-1)[..., None, None]
+    return np.asarray(np.eye(3) - along[..., :, None] * along[..., None, :] / np.where(sizes > 0.0, sizes, 1.0))
 
 
 def runs_of(shared: Array, widths: npt.NDArray[np.intp]) -> list[Array]:
@@ -316,35 +459,11 @@ def runs_of(shared: Array, widths: npt.NDArray[np.intp]) -> list[Array]:
     return [shared[a:b, :, : int(widths[a])] for a, b in itertools.pairwise(borders)]
 
 
-def interpolate_point(points: list[TrajectoryPoint], md: float) -> TrajectoryPoint:
-    """Point on the arc between two stations at ``md`` (m); its covariance is interpolated between theirs.
+def on_arc(upper: Array, lower: Array, displacement: Array, leg: float, share: float) -> tuple[Array, Array]:
+    """Displacement (3,) from the upper station to a share of a leg (m) between tangents (3,), and the tangent there.
 
-    Raises
-    ------
-    SurveyError
-        When ``md`` is outside the trajectory.
+    The arc is bent evenly so that it ends where the method put the lower station, ``displacement`` (3,) from the upper.
     """
-    if not points[0].md <= md <= points[-1].md:
-        raise SurveyError(f"trajectory: expected a depth of {points[0].md:g}..{points[-1].md:g} m, got {md:g} m")
-    for upper, lower in itertools.pairwise(points):
-        if md <= lower.md:
-            return on_arc(upper, lower, (md - upper.md) / (lower.md - upper.md))
-    return points[-1]
-
-
-def on_arc(upper: TrajectoryPoint, lower: TrajectoryPoint, f: float) -> TrajectoryPoint:
-    """Fraction ``f`` of a leg along its arc, bent evenly so that it ends where the method put the lower station."""
-    angle = math.atan2(
-        float(np.linalg.norm(np.cross(upper.tangent, lower.tangent))), float(upper.tangent @ lower.tangent)
-    )
-    if angle < 1e-9:
-        tangent = upper.tangent + f * (lower.tangent - upper.tangent)
-    else:
-        tangent = (math.sin((1.0 - f) * angle) * upper.tangent + math.sin(f * angle) * lower.tangent) / math.sin(angle)
-    half = 0.5 * (lower.md - upper.md)
-    arc = half * f * ratio_factor(math, f * angle) * (upper.tangent + tangent)
-    whole = half * ratio_factor(math, angle) * (upper.tangent + lower.tangent)
-    position = upper.position + arc + f * (lower.position - upper.position - whole)
-    cov = (1.0 - f) * upper.cov + f * lower.cov
-    shared = add_shared_errors((1.0 - f) * upper.shared, f * lower.shared)
-    return TrajectoryPoint(upper.md + f * (lower.md - upper.md), tangent, position, cov, shared)
+    tangent = turned_tangents(upper[None], lower[None], np.array([share]))[0]
+    arc = arc_displacements(np.array([share * leg, leg]), np.array([upper, upper]), np.array([tangent, lower]))
+    return arc[0] + share * (displacement - arc[1]), tangent

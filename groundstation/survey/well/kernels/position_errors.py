@@ -4,7 +4,8 @@ A station that another one follows counts with both of its legs from then on, th
 
     C_K = sum_{k<K} R_k + R*_K + (sum_{k<K} e_k + e*_K) (sum_{k<K} e_k + e*_K)^T
 
-so two running sums are all that is kept. Source: thesis eqs. I.1-I.12. Frame: north, east, down; m.
+and an error of its depth moves it along the leg above, tau_K, and what is below by the kink there, tau_k - tau_(k+1).
+So two running sums are all that is kept. Source: thesis eqs. I.1-I.12. Frame: north, east, down; m.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ Places = npt.NDArray[np.intp]
 
 @kernel
 def add_stations(
-    weights: Array, ends: Array, starts: Places, places: Places, lean: Array, down: Array, covs: Array, widths: Places,
-    passed: Array, own: Array, first: int, every: int, marks: Array, own_marks: Array, shared: Array, out: Array,
+    weights: Array, ends: Array, starts: Places, places: Places, lean: Array, down: Array, covs: Array, kinks: Array,
+    alongs: Array, depth_starts: Places, depth_places: Places, depths: Array, widths: Places, passed: Array, own: Array,
+    first: int, every: int, marks: Array, own_marks: Array, shared: Array, out: Array,
 ) -> None:  # fmt: skip
     """Go on down a hole from the station where the sums end.
 
@@ -32,6 +34,10 @@ def add_stations(
         columns from ``starts[k]`` to before ``starts[k + 1]`` are its change, level and vertical, for one standard
         deviation of the shared errors at these places, and all others do not change it
     covs : (n + 1, 3, 3), of the same tangents: the covariance that is its own
+    kinks, alongs : (n, 3), of the station before each: by how much a metre of its depth moves what is below it; of
+        each: by how much a metre of its depth moves itself
+    depth_starts, depth_places, depths : (n + 2,), (d,) and (d,) m, of every depth from the station before on: the same
+        as of the tangents
     widths : (n,), how many shared errors are known at each position
     passed, own : (3, s) and (3, 3), the running sums e and R; they go on with every station but the last
     first, every, marks, own_marks : the sums after the station ``first``, and after every so many from there, are put
@@ -47,8 +53,13 @@ def add_stations(
             passed[0, s] += weight * lean[0, c]
             passed[1, s] += weight * lean[1, c]
             passed[2, s] += weight * down[c]
+        for c in range(depth_starts[k], depth_starts[k + 1]):
+            s = depth_places[c]
+            for i in range(3):
+                passed[i, s] += kinks[k, i] * depths[c]
         nn = ne = nd = ee = ed = dd = 0.0
         c, last = starts[k + 1], starts[k + 2]
+        m, last_depth = depth_starts[k + 1], depth_starts[k + 2]
         for s in range(widths[k]):
             n, e, d = passed[0, s], passed[1, s], passed[2, s]
             if c < last and places[c] == s:
@@ -56,6 +67,11 @@ def add_stations(
                 e += end * lean[1, c]
                 d += end * down[c]
                 c += 1
+            if m < last_depth and depth_places[m] == s:
+                n += alongs[k, 0] * depths[m]
+                e += alongs[k, 1] * depths[m]
+                d += alongs[k, 2] * depths[m]
+                m += 1
             if len(shared) > 0:
                 shared[k, 0, s], shared[k, 1, s], shared[k, 2, s] = n, e, d
             nn += n * n
@@ -78,7 +94,8 @@ def warm_up() -> None:
     """Compile the loop or load it from the cache, so that the first survey does not wait for it."""
     starts, places = np.array([0, 0, 1]), np.zeros(1, np.intp)
     add_stations(
-        np.ones(1), np.ones(1), starts, places, np.zeros((2, 1)), np.zeros(1), np.zeros((2, 3, 3)), np.ones(1, np.intp),
+        np.ones(1), np.ones(1), starts, places, np.zeros((2, 1)), np.zeros(1), np.zeros((2, 3, 3)), np.zeros((1, 3)),
+        np.zeros((1, 3)), np.zeros(3, np.intp), places[:0], np.zeros(0), np.ones(1, np.intp),
         np.zeros((3, 1)), np.zeros((3, 3)), 0, 1, np.empty((1, 3, 1)), np.empty((1, 3, 3)), np.empty((0, 3, 1)),
         np.empty((1, 3, 3)),
     )  # fmt: skip

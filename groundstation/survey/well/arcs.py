@@ -1,0 +1,42 @@
+"""Arcs between two directions: the shape of a leg by the minimum curvature method.
+
+A leg of length D that bends by the angle b from the unit tangent t1 to t2 is moved by D/2 RF (t1 + t2) with
+RF = (2/b) tan(b/2). It is worked out from the tangents themselves, so it is regular at every inclination.
+Frame: north, east, down; m and rad. Source: Sawaryn and Thorogood, SPE 84246-PA.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.well.methods import OPPOSITE, ratio_factor
+
+Array = npt.NDArray[np.float64]
+STRAIGHT = 1e-9  # rad, of a bend
+
+
+def bend_angles(upper: Array, lower: Array) -> Array:
+    """Angles (...,), 0 to pi rad, between tangents (..., 3); exact where they are small."""
+    cross = np.cross(upper, lower)
+    return np.arctan2(np.sqrt((cross * cross).sum(axis=-1)), (upper * lower).sum(axis=-1))
+
+
+def arc_displacements(lengths: Array, upper: Array, lower: Array) -> Array:
+    """Displacements (n, 3) of legs of lengths (n,) between tangents (n, 3).
+
+    Where the two are opposite no arc is defined: such a leg leads nowhere, as the mean of its tangents does.
+    """
+    bends = bend_angles(upper, lower)
+    factors = np.where(bends > math.pi - OPPOSITE, 1.0, ratio_factor(np, np.minimum(bends, math.pi - OPPOSITE)))
+    return np.asarray((0.5 * lengths * factors)[:, None] * (upper + lower))
+
+
+def turned_tangents(upper: Array, lower: Array, shares: Array) -> Array:
+    """Tangents (n, 3) at shares (n,) of arcs between tangents (n, 3)."""
+    bends, f = bend_angles(upper, lower), shares[:, None]
+    bent = np.clip(bends, STRAIGHT, math.pi - OPPOSITE)[:, None]
+    turned = (np.sin((1.0 - f) * bent) * upper + np.sin(f * bent) * lower) / np.sin(bent)
+    return np.where((bends < STRAIGHT)[:, None], upper + f * (lower - upper), turned)

@@ -1,0 +1,79 @@
+"""What is not known of measured depths: they move a station along the hole.
+
+The depth of a node is that of the bit less the tubes between the two,
+
+    md = (1 + scale) bit + offset + reading - sum of the lengths below the node.
+
+Scale and offset are one number for the whole hole; the length of a tube is shared by all that the nodes above it read;
+each reading of the bit errs anew. A station is where its readings are on the mean. What was measured there was measured
+at the true depth, so a depth error changes how long the legs are and not which way they point.
+
+The sigmas that stand where nothing was told:
+
+* scale 5.6e-4: what the industry's model gives the drill pipe's depth (DSFS of ISCWSA MWD revision 5.1);
+* offset 1 cm: the collar's edge and the stick-up, read by hand with a rule;
+* tube 1 mm: a steel tape of class II (0.3 mm + 0.2 mm a metre, Directive 2014/32/EU) and the seat of the thread;
+* reading 2 mm: a depth that is read to the millimetre on a string that hangs and stretches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.fusion.shared import Packed, Places
+
+Array = npt.NDArray[np.float64]
+OF_ALL = 2  # of the places of a reading, before those of the tubes below it: scale and offset
+
+
+@dataclass(frozen=True, slots=True)
+class DepthErrors:
+    """Standard deviations of what makes a depth."""
+
+    scale_std: float = 5.6e-4  # m/m, of the depth of the bit
+    offset_std: float = 0.01  # m, of the stick-up
+    tube_std: float = 1e-3  # m, of the length of each tube
+    reading_std: float = 2e-3  # m, of each reading of the bit
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StationDepth:
+    """Error of one station's depth: its shared columns (1, s), m for one standard deviation, and what is its own.
+
+    The places of the columns ascend.
+    """
+
+    columns: Packed
+    own_var: float  # m^2
+
+
+EXACT: Final = StationDepth(Packed(np.zeros((1, 0))), 0.0)
+
+
+def mean_depth(
+    md: float, places: Sequence[Places], errors: DepthErrors, tube_length: float, width: int
+) -> StationDepth:
+    """Depth error of a station that several nodes read, one reading as good as another.
+
+    Parameters
+    ----------
+    md : m
+    places : of the columns of each reading: scale, offset, and the length of each tube below its node from the bit up
+    tube_length : m, as it is told
+    width : number of shared columns that are known
+    """
+    below = np.array([len(own) - OF_ALL for own in places])
+    deepest = max(places, key=len)
+    # the length of a tube is in the readings of all that have it below them
+    passed = np.cumsum(np.bincount(below, minlength=len(deepest) - OF_ALL + 1)[::-1])[::-1][1:]
+    bit = md + tube_length * float(below.mean())
+    columns = np.concatenate(
+        [[errors.scale_std * bit, errors.offset_std], errors.tube_std / len(places) * passed[: len(deepest) - OF_ALL]]
+    )
+    order = np.argsort(deepest)
+    return StationDepth(Packed.of(deepest[order], columns[None, order], width), errors.reading_std**2 / len(places))
