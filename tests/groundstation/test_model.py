@@ -273,7 +273,7 @@ def test_uncertainty_is_told_at_a_confidence_with_its_sources(tmp_path: Path) ->
         for axis, name in enumerate(("sigma_north_m", "sigma_east_m", "sigma_tvd_m")):
             squares = sum(source[name] ** 2 for source in sources.values())
             assert squares == pytest.approx(point.cov[axis, axis], rel=1e-6, abs=1e-15)
-    assert set(view["stations"][-1]["sources"]) == {"random", "mounts", "joints", "accelerometer_bias"}
+    assert set(view["stations"][-1]["sources"]) == {"random", "mounts", "joints", "accelerometer_bias", "depth", "path"}
 
 
 def test_another_confidence_scales_the_regions(tmp_path: Path) -> None:

@@ -1,20 +1,37 @@
-"""How far a hole leaves the arc between two stations whose directions are known, since its curvature wanders.
+"""How far a hole leaves the arcs between stations whose directions are known, since its curvature wanders.
 
-A survey draws an arc. For a curvature as in ``curvature_process``, at rest in its distribution, the offset x(u) at a
-length u of a leg L with the known direction theta(L) at its end leaves that arc by x(u) - u^2 theta(L) / (2 L). At the
-lower station that is the antisymmetric moment of the curvature over the leg, which no direction at its ends shows and
-which legs next to each other hardly share: it is taken as independent from leg to leg. For legs much shorter than the
-correlation length l its variance is sigma^2 L^5 / (60 l).
+A survey draws an arc from direction to direction. For a curvature as in ``curvature_process``, at rest in its
+distribution, the place at a share f of a leg of length L leaves the arc, each way across the hole, by
+
+    m(f) = x(f L) - f^2 L / 2 theta(L),        at the lower station m(1) = integral of (L/2 - u) kappa(u) du,
+
+a moment that no direction at the ends shows. It is against what the curvature was at the upper station (b), and what it
+is at the lower one is against it (a), so that legs next to each other undo a part of each other:
+
+    Var E_K = Var E_(K-1) + v_K + 2 b_K c_K,        c_(K+1) = exp(-L_K / l) c_K + a_K,
+
+with the variance v of a leg's own moment. Of legs much shorter than the correlation length l, v is sigma^2 L^5 / (60 l),
+and a hole many l long gathers one sixth of it a leg.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 from groundstation.survey.path.curvature_process import CURVATURE, DIRECTION, OFFSET, process_step
 
 SAME = 6  # decimals of a length (m), to which a leg is as another
+
+
+class ArcMoment(NamedTuple):
+    """What the curvature does to a place of a leg against its arc, for a curvature of variance 1."""
+
+    variance: float  # v, m^4
+    with_start: float  # b, m^2: covariance with the curvature at the upper station
+    with_end: float  # a, m^2: with that at the lower station
+    kept: float  # of a curvature over the leg
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,29 +41,37 @@ class LegWander:
     std: float
     length: float
 
-    def variance(self, leg: float, share: float = 1.0) -> float:
-        """Variance (m^2), each way across the hole, of the place at a share of a leg (m) against the arc."""
-        if self.std == 0.0:
-            return 0.0
-        return self.std**2 * arc_variance(round(leg, SAME), round(share, SAME), self.length)
+    def moment(self, leg: float, share: float = 1.0) -> ArcMoment:
+        """What the place at a share of a leg (m) does against the arc."""
+        return arc_moment(round(leg, SAME), round(share, SAME), self.length)
+
+    def grown(self, memory: float, moment: ArcMoment) -> float:
+        """Variance (m^2) that a leg adds to what those above have gathered; ``memory`` is their c.
+
+        Where the leg undoes more than it adds nothing is taken off: the planes of two legs are not quite the same.
+        """
+        return self.std**2 * max(moment.variance + 2.0 * moment.with_start * memory, 0.0)
+
+
+def remembered(memory: float, moment: ArcMoment) -> float:
+    """The c of the next leg."""
+    return moment.kept * memory + moment.with_end
 
 
 @lru_cache(maxsize=4096)
-def arc_variance(leg: float, share: float, correlation_length: float) -> float:
-    """The same for a curvature of variance 1."""
-    if not leg > 0.0 or not share > 0.0:
-        return 0.0
-    at, whole = _state_variances(share * leg, correlation_length), _state_variances(leg, correlation_length)
+def arc_moment(leg: float, share: float, correlation_length: float) -> ArcMoment:
+    """Moment at a share of a leg (m)."""
+    to_place, noise = process_step(share * leg, correlation_length)
+    whole, whole_noise = process_step(leg, correlation_length)
     rest, _ = process_step((1.0 - share) * leg, correlation_length)
-    both = at[OFFSET][DIRECTION] + rest[DIRECTION, CURVATURE] * at[OFFSET][CURVATURE]
+    there, end = (
+        step[:, CURVATURE, None] * step[None, :, CURVATURE] + added
+        for step, added in ((to_place, noise), (whole, whole_noise))
+    )
     by_turn = 0.5 * share * share * leg
-    found = at[OFFSET][OFFSET] - 2.0 * by_turn * both + by_turn * by_turn * whole[DIRECTION][DIRECTION]
-    return float(max(found, 0.0))
-
-
-def _state_variances(length: float, correlation_length: float) -> list[list[float]]:
-    """Covariance (3, 3) of offset, direction and curvature after a length (m) from a known place and direction."""
-    step, noise = process_step(length, correlation_length)
-    by_curvature = step[:, CURVATURE]
-    found: list[list[float]] = (by_curvature[:, None] * by_curvature[None, :] + noise).tolist()
-    return found
+    offset_and_turn = there[OFFSET, DIRECTION] + rest[DIRECTION, CURVATURE] * there[OFFSET, CURVATURE]
+    variance = there[OFFSET, OFFSET] - 2.0 * by_turn * offset_and_turn + by_turn**2 * end[DIRECTION, DIRECTION]
+    with_start = to_place[OFFSET, CURVATURE] - by_turn * whole[DIRECTION, CURVATURE]
+    with_end = rest[CURVATURE, CURVATURE] * there[OFFSET, CURVATURE] - by_turn * end[DIRECTION, CURVATURE]
+    kept = float(whole[CURVATURE, CURVATURE])
+    return ArcMoment(max(float(variance), 0.0), float(with_start), float(with_end), kept)

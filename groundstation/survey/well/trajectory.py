@@ -5,7 +5,7 @@ station: the Jacobian of the balanced tangential method, used for every method a
 an arc that bends by b it leaves out b/3 along the hole and b^2/12 across it of what one leg makes of an error: of first
 order in the error it is right to first order in the bend, at 3 deg a leg to two hundredths along and to two parts in
 ten thousand across. An error of a depth, e, changes how long a leg is, and so moves what is below it along the leg,
-tau (e_k - e_(k-1)) with the leg's displacement a metre tau. What the path does between stations is each leg's own.
+tau (e_k - e_(k-1)) with the leg's displacement a metre tau. What the path does between stations is in ``leg_wander``.
 Errors are kept by running sums in a compiled loop: appending costs the same however many stations there are, and
 where one changes, those below are drawn from the nearest mark above. What stations share may become more columns as the
 hole grows; the columns of a point are those known when it was added.
@@ -28,7 +28,7 @@ from groundstation.errors import SurveyError
 from groundstation.survey.fusion.resolve import Direction, direction_angles
 from groundstation.survey.fusion.shared import Packed, add_shared_errors, packed_of
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
-from groundstation.survey.path.leg_wander import LegWander
+from groundstation.survey.path.leg_wander import LegWander, remembered
 from groundstation.survey.well.arcs import arc_displacements, bend_angles, turned_tangents
 from groundstation.survey.well.depth_errors import EXACT, StationDepth
 from groundstation.survey.well.methods import OPPOSITE, Method, leg_displacement
@@ -67,6 +67,7 @@ ROW: Final = np.dtype(
         ("along", np.float64, 3),  # displacement of the leg above for a metre of it
         ("kinks", np.float64, (3, 3)),  # m^2, what the own errors of the depths above come to
         ("path", np.float64, (3, 3)),  # m^2, what the path between the stations above comes to
+        ("memory", np.float64),  # m^2, what that has to do with the curvature here
         ("position", np.float64, 3),
         ("cov", np.float64, (3, 3)),
     ]
@@ -280,7 +281,7 @@ class Trajectory:
         weights = (0.5 * (sums.length + leg * f * (2.0 - f)), 0.5 * leg * f * f)
         by_depth = (upper["along"] - f * along, f * along)
         shared, cov = sums.passed, sums.own + upper["kinks"] + upper["path"]
-        cov = cov + self._wander.variance(leg, f) * across_of(along)
+        cov = cov + self._wander.grown(float(upper["memory"]), self._wander.moment(leg, f)) * across_of(along)
         for row, own, weight, moved in zip((upper, lower), (k, k + 1), weights, by_depth, strict=True):
             cov = cov + weight**2 * row["own"] + float(row["depth_var"]) * np.outer(moved, moved)
             shared = add_shared_errors(shared, weight * self._tangent_columns(own))
@@ -365,10 +366,13 @@ class Trajectory:
         bent = rows["along"][:-1] - rows["along"][1:]
         kinks = rows["depth_var"][:-1, None, None] * (bent[:, :, None] * bent[:, None])
         rows["kinks"] = np.add.accumulate([rows["kinks"][0], *kinks])
-        wander = np.array([self._wander.variance(leg) for leg in lengths.tolist()])
-        rows["path"] = np.add.accumulate(
-            [rows["path"][0], *(wander[:, None, None] * across_of(rows["along"][1:]))]
-        )
+        memory, grown = rows["memory"].item(0), []
+        for place, leg in enumerate(lengths.tolist(), 1):
+            moment = self._wander.moment(leg)
+            grown.append(self._wander.grown(memory, moment))
+            rows["memory"][place] = memory = remembered(memory, moment)
+        left = np.array(grown)[:, None, None] * across_of(rows["along"][1:])
+        rows["path"] = np.add.accumulate([rows["path"][0], *left])
 
     def _follow(self, sums: TrajectorySums, begin: int, end: int, *, with_columns: bool) -> Followed:
         """Continue ``sums`` from one place to another."""
