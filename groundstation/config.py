@@ -48,7 +48,9 @@ class GroundConfig(BaseModel):
     string_transport: Literal["shortest", "parallel"] = Field(
         "shortest", description="yaw of a tube in a bent hole: that of the head, or as a shaft without twist carries it"
     )
-    collar_inclination_deg: float = Field(0.0, ge=0.0, lt=180.0, description="of the hole at the collar")
+    collar_inclination_deg: float | None = Field(
+        None, ge=0.0, lt=180.0, description="of the hole at the collar; as the design begins if absent"
+    )
     collar_azimuth_deg: float = 0.0
     collar_std_deg: float = Field(0.0, ge=0.0, description="of the direction at the collar, each way")
     weighting: Weighting = Field(Weighting.BAYES, description="how the readings of one station count")
@@ -88,8 +90,10 @@ class GroundConfig(BaseModel):
 
     @property
     def collar(self) -> Direction:
-        """Direction of the hole at the collar, known as well as is stated."""
-        inclination, azimuth = math.radians(self.collar_inclination_deg), math.radians(self.collar_azimuth_deg)
+        """Direction of the hole at the collar, known as well as is stated; as the design begins where it is not."""
+        inclination, azimuth = self.design.inclination, self.design.azimuth
+        if self.collar_inclination_deg is not None:
+            inclination, azimuth = math.radians(self.collar_inclination_deg), math.radians(self.collar_azimuth_deg)
         along = np.array([math.cos(azimuth), math.sin(azimuth)])
         across = np.array([-along[1], along[0]])
         lean_cov = math.cos(inclination) ** 2 * np.outer(along, along) + np.outer(across, across)

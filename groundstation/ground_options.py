@@ -29,7 +29,7 @@ class GroundRequest:
     tolerance: str
     steering_deg_per_m: float
     string_transport: str
-    collar_inclination_deg: float
+    collar_inclination_deg: float | None
     collar_azimuth_deg: float
     collar_std_deg: float
     weighting: str
@@ -100,9 +100,7 @@ ground_options = gather_options(
     click.option(
         "--collar-inclination-deg",
         type=click.FloatRange(0.0, 180.0, max_open=True),
-        default=0.0,
-        show_default=True,
-        help="Of the hole at the collar, where the head holds the string.",
+        help="Of the hole at the collar, where the head holds the string  [default: as the design begins]",
     ),
     click.option("--collar-azimuth-deg", type=float, default=0.0, show_default=True, help="Of the hole at the collar."),
     click.option(

@@ -130,6 +130,11 @@ class SurveyedHole:
         self.settle()
         return self._trajectory
 
+    @property
+    def turned_back(self) -> list[float]:
+        """Depths (m) of stations that point back against the one above, in the trajectory as it was drawn last."""
+        return self._trajectory.turned_back
+
     def direction_of(self, station: SurveyStation) -> Direction:
         """Direction of the hole at a station, the transport of the string in it."""
         self.settle()
