@@ -10,8 +10,8 @@ is at the lower one is against it (a), so that legs next to each other undo a pa
 
     Var E_K = Var E_(K-1) + v_K + 2 b_K c_K,        c_(K+1) = exp(-L_K / l) c_K + a_K,
 
-with the variance v of a leg's own moment. Of legs much shorter than the correlation length l, v is sigma^2 L^5 / (60 l),
-and a hole many l long gathers one sixth of it a leg.
+with the variance v of a leg's own moment. Of legs much shorter than the correlation length l, v is
+sigma^2 L^5 / (60 l), and a hole many l long gathers one sixth of it a leg.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The course that a hole is to take: arcs and straight lines one after the other, and the point of it nearest to a place.
+"""The course that a hole is to take: arcs and straight lines one after the other, and its point nearest to a place.
 
 Between its stations a plan follows minimum curvature, a circle or a straight line; above its first station and below
 its last it goes on straight. Frame: north, east, down; m and rad.

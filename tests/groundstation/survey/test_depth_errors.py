@@ -15,7 +15,7 @@ from groundstation.survey.fusion.resolve import Direction, known_direction
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.well.depth_errors import EXACT, DepthErrors, mean_depth
-from groundstation.survey.well.trajectory import TrajectoryPoint, Trajectory
+from groundstation.survey.well.trajectory import Trajectory, TrajectoryPoint
 
 DEG = math.pi / 180.0
 STEP = 0.02  # m
@@ -127,7 +127,7 @@ def test_between_stations_the_region_holds_the_hole() -> None:
     """Stations a long way apart, read without error: all that is not known is what the path did between them."""
     generator = np.random.default_rng(5)
     hole, leg = drilled(HOLES, 0.0, generator), 4.0
-    inside = {share: 0 for share in (0.25, 0.5, 0.75, 1.0)}
+    inside = dict.fromkeys((0.25, 0.5, 0.75, 1.0), 0)
     sizes = dict.fromkeys(inside, 0.0)
     ends = [hole.at(hole.tangents, np.full(HOLES, md)) for md in (leg, 2.0 * leg)]
     true = {share: hole.at(hole.positions, np.full(HOLES, leg * (1.0 + share))) for share in inside}
@@ -206,7 +206,8 @@ def test_a_depth_without_error_changes_nothing() -> None:
     np.testing.assert_array_equal(one.covs, other.covs)
 
 
-def test_stations_put_one_by_one_are_as_the_whole_hole(count: int = 70) -> None:
+def test_stations_put_one_by_one_are_as_the_whole_hole() -> None:
+    count = 70
     shared = SharedErrors()
     whole = hole_of(count, shared)
     below = [shared.depth_places_of(list(range(1, n + 1))) for n in range(count)]

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
+from groundstation.survey.fusion.resolve import known_direction
 from groundstation.survey.wall.column_deviation import (
     PRESETS,
     ColumnDesign,
@@ -15,7 +16,6 @@ from groundstation.survey.wall.column_deviation import (
     planes_across,
     project_to_target,
 )
-from groundstation.survey.fusion.resolve import known_direction
 from groundstation.survey.well.trajectory import TrajectoryPoint
 from groundstation.survey.well.well_plan import PlanLeg, WellPlan
 
@@ -57,7 +57,7 @@ def test_legs_of_even_rates_end_where_their_sum_does(inclination: float, azimuth
         return  # through the vertical
     along = sum(leg.length for leg in legs)
     assert plan.length == pytest.approx(along)
-    np.testing.assert_allclose(plan.positions[-1], summed(inclination, azimuth, legs)[-1], atol=4e-6 * along)
+    np.testing.assert_allclose(plan.positions[-1], summed(inclination, azimuth, legs)[-1], atol=7e-6 * along)
 
 
 @settings(max_examples=60, deadline=None)
