@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from groundstation.errors import ConfigurationError
+from groundstation.plan_settings import PlanSettings
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction, known_direction
 from groundstation.survey.path.leg_wander import LegWander
@@ -57,6 +58,7 @@ class GroundConfig(BaseModel):
     target: Positive = Field(30.0, description="m, length of the design axis")
     design_inclination_deg: float = Field(0.0, ge=0.0, le=180.0)
     design_azimuth_deg: float = 0.0
+    plan: PlanSettings | None = Field(None, description="course of the design, in place of the straight axis")
     column_radius: Positive = Field(0.6, description="m, of the finished column")
     tolerance: Literal["en-12716", "5-cm", "0.27-deg"] = Field("en-12716", description="preset of columns.PRESETS")
     steering_deg_per_m: Positive = Field(0.5, description="the most by which the rig bends a hole back")
@@ -102,14 +104,24 @@ class GroundConfig(BaseModel):
 
     @property
     def design(self) -> ColumnDesign:
-        """Axis of the column."""
+        """Axis of the column.
+
+        Raises
+        ------
+        SurveyError
+            When its plan is none.
+        """
+        allowed, plan = PRESETS[self.tolerance], self.plan
+        if plan is not None:
+            allowed = plan.to_tolerance(allowed)
+            return ColumnDesign.of_plan(self.rig, plan.to_plan(), plan.head, self.column_radius, allowed)
         return ColumnDesign(
             self.rig,
             inclination=math.radians(self.design_inclination_deg),
             azimuth=math.radians(self.design_azimuth_deg),
             length=self.target,
             radius=self.column_radius,
-            tolerance=PRESETS[self.tolerance],
+            tolerance=allowed,
         )
 
 

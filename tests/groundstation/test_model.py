@@ -316,6 +316,7 @@ def test_a_column_is_told_in_centimetres_percent_and_degrees(tmp_path: Path) -> 
     model, view = column_of(tmp_path, 1.0, 120.0)
     assert view["design"] == {
         "inclination_deg": 0.0, "azimuth_deg": 0.0, "target_m": 30.0, "radius_m": 0.6, "tolerance": "en-12716",
+        "course_m": [[0.0, 0.0, 0.0, 0.0], [30.0, 0.0, 0.0, 30.0]],
     }  # fmt: skip
     toe, point = view["stations"][-1], model.hole.trajectory[-1]
     lateral = 8.0 * math.sin(DEG) + FIRST_LEG

@@ -136,6 +136,11 @@ class ColumnDesign:
         )
         return np.asarray(turn @ np.stack([a, b]))
 
+    def points_at(self, along: Array) -> Array:
+        """Points (n, 3) at lengths (n,) along the axis, m."""
+        head = np.array(self.head)
+        return head + (along[:, None] * self.axis if self.plan is None else self.plan.points_at(along).points)
+
     @cached_property
     def end(self) -> DesignEnd:
         """Target of the column."""
