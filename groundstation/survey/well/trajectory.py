@@ -158,6 +158,11 @@ class Trajectory:
         return np.asarray(self._rows["position"][: len(self)])
 
     @property
+    def tangents(self) -> Array:
+        """Tangents (n, 3) at the points."""
+        return np.asarray(self._rows["tangent"][: len(self)])
+
+    @property
     def covs(self) -> Array:
         """Covariances (n, 3, 3) of the positions, m^2."""
         return np.asarray(self._rows["cov"][: len(self)])
