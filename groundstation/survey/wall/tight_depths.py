@@ -31,7 +31,7 @@ class TightRange:
     bottom: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a range that is none.
+        """Refuse a range that ends where it begins, or above.
 
         Raises
         ------

@@ -54,7 +54,7 @@ def find_voids(centres: Array, radii: Array) -> list[Void]:
 
 
 def _exposed(disc: int, present: npt.NDArray[np.intp], centres: Array, radii: Array) -> list[Arc]:
-    """HoleArcs of one circle that no other disc covers."""
+    """Arcs of one circle that no other disc covers."""
     others = present[present != disc]
     away = centres[others] - centres[disc]
     distance, r = np.hypot(away[:, 0], away[:, 1]), radii[disc]
@@ -74,7 +74,7 @@ def _exposed(disc: int, present: npt.NDArray[np.intp], centres: Array, radii: Ar
 
 
 def _between(disc: int, covered: list[tuple[float, float, int]]) -> list[Arc]:
-    """HoleArcs of a circle left free by intervals (begin, length, disc) in order of their begin."""
+    """Arcs of a circle left free by intervals (begin, length, disc) in order of their begin."""
     reach = max(begin + length - math.tau for begin, length, _ in covered)
     arcs = []
     for begin, length, other in covered:
@@ -85,7 +85,7 @@ def _between(disc: int, covered: list[tuple[float, float, int]]) -> list[Arc]:
 
 
 def _loops(arcs: list[Arc], centres: Array, radii: Array) -> list[list[Arc]]:
-    """HoleArcs joined end to begin: where one ends, the next disc's boundary begins."""
+    """Arcs joined end to begin: where one ends, the next disc's boundary begins."""
     by_disc: dict[int, list[Arc]] = {}
     for arc in arcs:
         by_disc.setdefault(arc.disc, []).append(arc)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 import tomllib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -91,7 +91,7 @@ class WallFile:
     north: str = "site"  # that designs, positions and every answer count from
     stations_north: str = "site"
     stations_turn: float = 0.0  # rad, azimuth of the north that stations count from, from ``north``
-    tight: TightRange = TightRange()
+    tight: TightRange = field(default_factory=TightRange)
     depths_read_from: str = DEPTHS_FROM[0]  # of stations and drilled depths
     depth_reference: str = DEPTHS_FROM[0]  # of all answers: the heads' own
     reference_height: float | None = None  # m, of the former above the latter

@@ -21,7 +21,8 @@ from groundstation.survey.well.methods import sinc
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 STRAIGHT = 1e-12  # rad, below which an arc bends to no side
-AT_ONCE = 200_000  # points times arcs that are compared together
+ROUNDING = 1e-12  # of a distance
+AT_ONCE = 1_000_000  # points times arcs that are compared together
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,19 +68,33 @@ class HoleArcs:
 
     def _nearest(self, points: Array) -> tuple[Indices, Array, Array]:
         """As ``nearest``, of as many points as are compared together."""
-        from_begin = points[:, None, :] - self.begin
-        ahead = np.einsum("psi,si->ps", from_begin, self.tangent)
-        aside = np.einsum("psi,si->ps", from_begin, self.normal)
-        curvature = self.bend / self.length
+        point, arc = self._candidates(points)
+        fraction = self._fractions(points[point], arc)
+        distance = np.linalg.norm(points[point] - self.places(arc, fraction), axis=-1)
+        order = np.lexsort((distance, point))
+        best = order[np.searchsorted(point[order], np.arange(len(points)))]
+        return arc[best], fraction[best], distance[best]
+
+    def _candidates(self, points: Array) -> tuple[Indices, Indices]:
+        """Pairs of a point and an arc that may be nearest to it; an arc lies within half its length of its middle."""
+        from scipy.spatial.distance import cdist
+
+        half = 0.5 * self.length
+        middles = self.places(np.arange(len(half)), np.full(len(half), 0.5))
+        apart = cdist(points, middles)
+        reach = np.min(apart + half, axis=1, keepdims=True)
+        point, arc = np.nonzero(apart - half <= reach + ROUNDING * (1.0 + reach))
+        return point, arc
+
+    def _fractions(self, points: Array, arc: Indices) -> Array:
+        """Fraction (k,) of arcs (k,) that is nearest to points (k, 3)."""
+        from_begin = points - self.begin[arc]
+        ahead, aside = (np.sum(from_begin * way[arc], axis=-1) for way in (self.tangent, self.normal))
+        length, bend = self.length[arc], self.bend[arc]
+        curvature = bend / length
+        bent = bend > STRAIGHT
         angle = np.arctan2(curvature * ahead, 1.0 - curvature * aside)
-        bent = self.bend > STRAIGHT
-        fraction = np.where(bent, angle / np.where(bent, self.bend, 1.0), ahead / self.length)
-        every = np.broadcast_to(np.arange(len(self.length)), fraction.shape)
-        end = self.places(every[0], np.ones(len(self.length)))
-        to_end = np.linalg.norm(points[:, None, :] - end, axis=-1)
+        fraction = np.where(bent, angle / np.where(bent, bend, 1.0), ahead / length)
+        to_end = np.linalg.norm(points - self.places(arc, np.ones(len(arc))), axis=-1)
         nearer_end = np.where(np.linalg.norm(from_begin, axis=-1) <= to_end, 0.0, 1.0)
-        fraction = np.where((fraction >= 0.0) & (fraction <= 1.0), fraction, nearer_end)
-        distance = np.linalg.norm(points[:, None, :] - self.places(every, fraction), axis=-1)
-        best = np.argmin(distance, axis=1)
-        rows = np.arange(len(points))
-        return best, fraction[rows, best], distance[rows, best]
+        return np.where((fraction >= 0.0) & (fraction <= 1.0), fraction, nearer_end)

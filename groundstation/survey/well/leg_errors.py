@@ -6,8 +6,8 @@ the fraction f of the leg the place errs by
 
     e(f) = (1 - f) e_k + f e_k+1 + f (1 - f) L / 2 (d_k - d_k+1)
 
-What depth errs, or a position directly, is blended. The point is no measurement of its own: it errs by what its two
-stations do. An error that does not change along the hole moves it as the straight blend does; errors of single stations
+What depth errs, or a position directly, is blended. The point is not measured itself: it errs by what its two stations
+do. An error that does not change along the hole moves it as the straight blend does; errors of single stations
 bow it. Frame: north, east, down; m and rad. Source: minimum curvature, linearised; stations as ``error_propagation``.
 """
 
