@@ -16,13 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.well.arcs import STRAIGHT, arc_displacements, bend_angles
+from groundstation.survey.well.arcs import arc_displacements, bend_angles
+from groundstation.survey.well.hole_arcs import HoleArcs
 from groundstation.survey.well.methods import station_tangents
 
 Array = npt.NDArray[np.float64]
 PIECE = math.radians(0.5)  # of an even build and turn, that is drawn as one arc: it is off by micrometres a metre
 SAME_MD = 1e-6  # m
-AT_ONCE = 64  # places whose nearest points are sought together
 
 
 class PlanLeg(NamedTuple):
@@ -114,76 +114,35 @@ class WellPlan:
         return np.concatenate([np.zeros((1, 3)), np.cumsum(legs, axis=0)])
 
     @cached_property
-    def _arcs(self) -> tuple[Array, Array, Array, Array]:
-        """Of every leg: tangent (n + 1, 3) and unit vector to the inside of its bend, curvature (n + 1,), begin (m).
-
-        The first is what is above the head, the last what is below the end.
-        """
-        t = np.concatenate([self.tangents[:1], self.tangents])  # at the upper end of each, of the first at its lower
-        bends = np.concatenate([[0.0], bend_angles(self.tangents[:-1], self.tangents[1:]), [0.0]])
-        lengths = np.concatenate([[1.0], np.diff(self.md), [1.0]])
-        ahead = np.concatenate([self.tangents[:1], self.tangents[1:], self.tangents[-1:]])
-        inside = ahead - (ahead * t).sum(axis=1)[:, None] * t
-        sizes = np.sqrt((inside * inside).sum(axis=1))
-        bent = bends > STRAIGHT
-        inside = np.where(bent[:, None], inside / np.where(bent, sizes, 1.0)[:, None], 0.0)
-        return t, inside, np.where(bent, bends / lengths, 0.0), np.concatenate([[0.0], self.md])
+    def _arcs(self) -> HoleArcs:
+        return HoleArcs.of_stations(self.md, self.positions, self.tangents)
 
     def points_at(self, along: Array) -> NearestPoints:
         """Points at lengths (k,) along the plan, m."""
-        leg = np.searchsorted(self.md, along, side="right")
-        tangents, inside, curvature, begins = self._arcs
-        lengths = along - begins[leg]
-        found = _on_arcs(lengths, self._origins[leg], tangents[leg], inside[leg], curvature[leg])
-        return NearestPoints(np.asarray(along, float), *found)
-
-    @cached_property
-    def _origins(self) -> Array:
-        return np.concatenate([self.positions[:1], self.positions])
+        within = np.clip(along, 0.0, self.length)
+        leg = np.clip(np.searchsorted(self.md, within, side="right") - 1, 0, len(self.md) - 2)
+        fraction = (within - self.md[leg]) / (self.md[leg + 1] - self.md[leg])
+        tangents = self._arcs.tangents(leg, fraction)
+        points = self._arcs.places(leg, fraction) + (along - within)[:, None] * tangents
+        return NearestPoints(np.asarray(along, float), points, tangents)
 
     def nearest(self, places: Array) -> NearestPoints:
-        """Points of the plan nearest to places (k, 3), m; of several as near the one higher up."""
-        parts = [self._nearest(places[k : k + AT_ONCE]) for k in range(0, len(places), AT_ONCE)]
-        if not parts:
+        """Points of the plan nearest to places (k, 3), m."""
+        if not len(places):
             return self.points_at(np.zeros(0))
-        return NearestPoints(
-            *(np.concatenate([getattr(part, name) for part in parts]) for name in ("along", "points", "tangents"))
-        )
-
-    def _nearest(self, places: Array) -> NearestPoints:
-        tangents, inside, curvature, begins = self._arcs
-        ends = np.concatenate([[0.0], np.diff(self.md), [math.inf]])  # of every leg, from where it begins
-        low = np.concatenate([[-math.inf], np.zeros(len(self.md))])
-        apart = places[:, None] - self._origins
-        forward, sideward = (apart * tangents).sum(axis=2), (apart * inside).sum(axis=2)
-        bent = curvature > 0.0
-        radius = 1.0 / np.where(bent, curvature, 1.0)
-        angle = np.arctan2(forward, radius - sideward)
-        turn = np.where(bent, np.where(np.isfinite(ends), ends, 0.0), 0.0) / radius
-        # beyond an arc the end that is nearer around its circle
-        angle = np.where((angle < 0.0) & (math.tau + angle - turn < -angle), turn, angle)
-        lengths = np.clip(np.where(bent, angle * radius, forward), low, ends)
-        shape = (*lengths.shape, 3)
-        points, along = _on_arcs(
-            lengths.reshape(-1), *(np.broadcast_to(x, shape).reshape(-1, 3) for x in (self._origins, tangents, inside)),
-            np.broadcast_to(curvature, lengths.shape).reshape(-1),
-        )  # fmt: skip
-        distances = ((places[:, None] - points.reshape(shape)) ** 2).sum(axis=2)
-        best, rows = np.argmin(distances, axis=1), np.arange(len(places))
-        return NearestPoints(
-            begins[best] + lengths[rows, best], points.reshape(shape)[rows, best], along.reshape(shape)[rows, best]
-        )
-
-
-def _on_arcs(lengths: Array, origins: Array, tangents: Array, inside: Array, curvature: Array) -> tuple[Array, Array]:
-    """Points and tangents (k, 3) at lengths (k,) of arcs."""
-    angle = curvature * lengths
-    bent = angle != 0.0
-    safe = np.where(bent, angle, 1.0)
-    forward = lengths * np.where(bent, np.sin(angle) / safe, 1.0)
-    sideward = lengths * np.where(bent, 2.0 * np.sin(0.5 * angle) ** 2 / safe, 0.0)
-    points = origins + forward[:, None] * tangents + sideward[:, None] * inside
-    return points, np.cos(angle)[:, None] * tangents + np.sin(angle)[:, None] * inside
+        leg, fraction, distance = self._arcs.nearest(places)
+        along = self.md[leg] + fraction * (self.md[leg + 1] - self.md[leg])
+        # straight on above the head and below the end
+        for begin, tangent, end in (
+            (self.positions[0], self.tangents[0], 0.0),
+            (self.positions[-1], self.tangents[-1], self.length),
+        ):
+            beyond = ((places - begin) * tangent).sum(axis=1)
+            away = np.sqrt((((places - begin) - beyond[:, None] * tangent) ** 2).sum(axis=1))
+            is_there = (beyond < 0.0) if end == 0.0 else (beyond > 0.0)
+            nearer = is_there & (away < distance)
+            along, distance = np.where(nearer, end + beyond, along), np.where(nearer, away, distance)
+        return self.points_at(along)
 
 
 def _tangent(inclination: float, azimuth: float) -> Array:
