@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from groundstation.survey.well.analysis import Analysis
+from groundstation.survey.well.arcs import on_arc
 from groundstation.survey.well.ellipsoid import hole_axes, plan_ellipse
 from groundstation.survey.well.methods import station_tangents
-from groundstation.survey.well.trajectory import on_arc
 
 COORDINATES = ("northing_m", "easting_m", "height_m")
 

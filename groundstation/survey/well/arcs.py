@@ -40,3 +40,13 @@ def turned_tangents(upper: Array, lower: Array, shares: Array) -> Array:
     bent = np.clip(bends, STRAIGHT, math.pi - OPPOSITE)[:, None]
     turned = (np.sin((1.0 - f) * bent) * upper + np.sin(f * bent) * lower) / np.sin(bent)
     return np.where((bends < STRAIGHT)[:, None], upper + f * (lower - upper), turned)
+
+
+def on_arc(upper: Array, lower: Array, displacement: Array, leg: float, share: float) -> tuple[Array, Array]:
+    """Displacement (3,) from the upper station to a share of a leg (m) between tangents (3,), and the tangent there.
+
+    The arc is bent evenly so that it ends where the method put the lower station, ``displacement`` (3,) from the upper.
+    """
+    tangent = turned_tangents(upper[None], lower[None], np.array([share]))[0]
+    arc = arc_displacements(np.array([share * leg, leg]), np.array([upper, upper]), np.array([tangent, lower]))
+    return arc[0] + share * (displacement - arc[1]), tangent

@@ -29,9 +29,19 @@ from groundstation.survey.fusion.resolve import Direction, direction_angles
 from groundstation.survey.fusion.shared import Packed, add_shared_errors, packed_of
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
 from groundstation.survey.path.leg_wander import LegWander, remembered
-from groundstation.survey.well.arcs import arc_displacements, bend_angles, turned_tangents
+from groundstation.survey.well.arcs import arc_displacements, bend_angles, on_arc
 from groundstation.survey.well.depth_errors import EXACT, StationDepth
 from groundstation.survey.well.methods import OPPOSITE, Method, leg_displacement
+from groundstation.survey.well.trajectory_rows import (
+    FEWEST,
+    GROWTH,
+    ROW,
+    Followed,
+    TrajectorySums,
+    across_of,
+    last_depths,
+    runs_of,
+)
 
 Array = npt.NDArray[np.float64]
 BLOCK = 64  # stations from mark to mark
@@ -53,46 +63,6 @@ class TrajectoryPoint:
     position: Array  # (3,) m, north east down
     cov: Array  # (3, 3) m^2, random and shared
     shared: Array  # (3, s) m, change for one standard deviation of every shared error; (3, 0) where it is not kept
-
-
-ROW: Final = np.dtype(
-    [
-        ("md", np.float64),
-        ("tangent", np.float64, 3),
-        ("own", np.float64, (3, 3)),  # covariance of the tangent that no other shares
-        ("width", np.intp),  # shared columns that the direction knows
-        ("count", np.intp),  # of them those that are kept
-        ("depths", np.intp),  # shared columns that are kept of its depth
-        ("depth_var", np.float64),  # m^2, of its depth, that no other shares
-        ("along", np.float64, 3),  # displacement of the leg above for a metre of it
-        ("kinks", np.float64, (3, 3)),  # m^2, what the own errors of the depths above come to
-        ("path", np.float64, (3, 3)),  # m^2, what the path between the stations above comes to
-        ("memory", np.float64),  # m^2, what that has to do with the curvature here
-        ("position", np.float64, 3),
-        ("cov", np.float64, (3, 3)),
-    ]
-)
-FEWEST = 8  # rows of a table
-GROWTH = 8  # share of its rows by which a table grows
-
-
-@dataclass(frozen=True, slots=True)
-class TrajectorySums:
-    """Running sums of the error kernel at a station, and the length of the last leg (m)."""
-
-    own: Array  # (3, 3)
-    passed: Array  # (3, s)
-    length: float
-
-
-@dataclass(frozen=True, slots=True)
-class Followed:
-    """Result of following a part of a hole down."""
-
-    sums: TrajectorySums  # at its end
-    marks: list[TrajectorySums]  # after every `BLOCK` stations of the hole
-    runs: list[Array]  # (.., 3, s) shared columns of the positions, those with equally many together, if wanted
-    covs: Array  # (n, 3, 3)
 
 
 class Trajectory:
@@ -448,31 +418,3 @@ class Trajectory:
         for leg in np.flatnonzero(bend_angles(tangents[:-1], tangents[1:]) > math.pi - OPPOSITE):
             above, below = mds[leg], mds[leg + 1]
             raise SurveyError(f"trajectory: the hole turns back on itself between {above:g} and {below:g} m")
-
-
-def last_depths(rows: npt.NDArray[np.void]) -> Array:
-    """Covariance (n, 3, 3), m^2, that the own error of each row's depth makes of its position."""
-    along = rows["along"]
-    return np.asarray(rows["depth_var"][:, None, None] * (along[:, :, None] * along[:, None]))
-
-
-def across_of(along: Array) -> Array:
-    """Projections (..., 3, 3) on the planes across vectors (..., 3); on all of space of one that is zero."""
-    sizes = (along * along).sum(axis=-1)[..., None, None]
-    return np.asarray(np.eye(3) - along[..., :, None] * along[..., None, :] / np.where(sizes > 0.0, sizes, 1.0))
-
-
-def runs_of(shared: Array, widths: npt.NDArray[np.intp]) -> list[Array]:
-    """Parts of columns (n, 3, s) with as many columns as were known of each, those with equally many together."""
-    borders = [0, *(np.flatnonzero(np.diff(widths)) + 1).tolist(), len(widths)]
-    return [shared[a:b, :, : int(widths[a])] for a, b in itertools.pairwise(borders)]
-
-
-def on_arc(upper: Array, lower: Array, displacement: Array, leg: float, share: float) -> tuple[Array, Array]:
-    """Displacement (3,) from the upper station to a share of a leg (m) between tangents (3,), and the tangent there.
-
-    The arc is bent evenly so that it ends where the method put the lower station, ``displacement`` (3,) from the upper.
-    """
-    tangent = turned_tangents(upper[None], lower[None], np.array([share]))[0]
-    arc = arc_displacements(np.array([share * leg, leg]), np.array([upper, upper]), np.array([tangent, lower]))
-    return arc[0] + share * (displacement - arc[1]), tangent

@@ -21,8 +21,8 @@ from groundstation.survey.wall.wall_joints import (
     neighbours_in_line,
     worst_joint,
 )
+from groundstation.survey.well.arcs import on_arc
 from groundstation.survey.well.methods import Method, station_positions, station_tangents
-from groundstation.survey.well.trajectory import on_arc
 
 DEG = math.pi / 180.0
 RADIUS, SPACING, REQUIRED, LENGTH = 0.60, 0.75, 0.80, 30.0
