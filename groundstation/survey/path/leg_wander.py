@@ -53,7 +53,7 @@ class LegWander:
         return self.std**2 * max(moment.variance + 2.0 * moment.with_start * memory, 0.0)
 
 
-def remembered(memory: float, moment: ArcMoment) -> float:
+def carry_memory(memory: float, moment: ArcMoment) -> float:
     """The c of the next leg."""
     return moment.kept * memory + moment.with_end
 

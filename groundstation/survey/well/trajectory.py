@@ -28,7 +28,7 @@ from groundstation.errors import SurveyError
 from groundstation.survey.fusion.resolve import Direction, direction_angles
 from groundstation.survey.fusion.shared import Packed, add_shared_errors, packed_of
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
-from groundstation.survey.path.leg_wander import LegWander, remembered
+from groundstation.survey.path.leg_wander import LegWander, carry_memory
 from groundstation.survey.well.arcs import arc_displacements, bend_angles, on_arc
 from groundstation.survey.well.depth_errors import EXACT, StationDepth
 from groundstation.survey.well.methods import OPPOSITE, Method, leg_displacement
@@ -345,7 +345,7 @@ class Trajectory:
         for place, leg in enumerate(lengths.tolist(), 1):
             moment = self._wander.moment(leg)
             grown.append(self._wander.grown(memory, moment))
-            rows["memory"][place] = memory = remembered(memory, moment)
+            rows["memory"][place] = memory = carry_memory(memory, moment)
         left = np.array(grown)[:, None, None] * across_of(rows["along"][1:])
         rows["path"] = np.add.accumulate([rows["path"][0], *left])
 

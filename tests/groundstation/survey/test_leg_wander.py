@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.survey.path.leg_wander import LegWander, remembered
+from groundstation.survey.path.leg_wander import LegWander, carry_memory
 
 PLACES = 1201
 
@@ -38,7 +38,7 @@ def test_what_a_path_gathers_is_what_sums_over_its_covariance_give(legs: list[fl
     for count, leg in enumerate(legs, 1):
         moment = wander.moment(leg)
         gathered += moment.variance + 2.0 * moment.with_start * memory
-        memory = remembered(memory, moment)
+        memory = carry_memory(memory, moment)
         assert gathered == pytest.approx(float(covariance[:count, :count].sum()), rel=2e-3)
 
 
@@ -49,7 +49,7 @@ def test_a_short_leg_has_its_limit_and_a_long_hole_gathers_a_sixth_of_it() -> No
     for _ in range(4000):
         moment = wander.moment(leg)
         gathered.append(wander.grown(memory, moment))
-        memory = remembered(memory, moment)
+        memory = carry_memory(memory, moment)
     assert gathered[-1] == pytest.approx(std**2 * leg**5 / (360.0 * length), rel=0.02)
 
 
