@@ -203,7 +203,7 @@ class Trajectory:
 
         Parameters
         ----------
-        depths : errors of their depths, by these; those that are missing are exact
+        depths : errors of their depths, by these; one that is missing stays as it was, which is exact at first
 
         Raises
         ------
@@ -222,7 +222,7 @@ class Trajectory:
             elif self._directions[place] is direction:
                 continue
             self._directions[place] = direction
-            self._depths[place] = depths.get(md, EXACT)
+            self._depths[place] = depths.get(md, self._depths[place])
             changed.append(place)
         self._direct(changed)
         if changed:
