@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from forked_commands import run
 from hand_fed import Rig
 from schemas import shown_on
 from test_model import knowing, survey
@@ -12,6 +13,9 @@ from test_model import knowing, survey
 from groundstation.config import GroundConfig, checked_config
 from groundstation.errors import ConfigurationError, SurveyError
 from groundstation.plan_settings import LegSettings, PlanSettings, read_plan
+from sim.rig.ground_settings import ground_settings
+from sim.world.scenario import scenario_of
+from sim.world.world import World
 
 LEGS = """
 inclination_deg = 0.0
@@ -144,3 +148,26 @@ def test_a_rig_tells_the_plan_and_its_verdict(tmp_path: Path) -> None:
     assert shown["stations"][-1]["deviation_cm"] < 1.0
     assert rig.ask("verdict")["target_m"] == 10.0
     rig.ground.close()
+
+
+def test_legs_of_a_scenario_are_the_plan_of_its_ground_station(tmp_path: Path) -> None:
+    legs = [{"length_m": 2.0}, {"to_inclination_deg": 6.0, "to_azimuth_deg": 90.0, "length_m": 4.0}]
+    tables = {
+        "rig": {"tubes": 2, "tube_length_m": 3.0},
+        "path": {"spiral": {"inclination_deg": 1.0, "turn_deg": 0.0}},
+        "design": {"azimuth_deg": 90.0, "leg": legs},
+    }
+    config = GroundConfig(folder=tmp_path, **ground_settings(World(scenario_of(tables), 1)))
+    radius = 4.0 / math.radians(6.0)
+    east = radius * (1.0 - math.cos(math.radians(6.0)))
+    down = 2.0 + radius * math.sin(math.radians(6.0))
+    np.testing.assert_allclose(config.design.end.point, [0.0, east, down], atol=1e-9)
+
+
+def test_the_command_refuses_a_plan_that_is_none_in_a_line(tmp_path: Path) -> None:
+    path = tmp_path / "plan.toml"
+    path.write_text("[[leg]]\nlength_m = 0.0\n")
+    done = run("ground", "--folder", tmp_path / "ground", "--plan", path)
+    assert (done.returncode, done.stdout) == (2, "")
+    lines = done.stderr.strip().splitlines()
+    assert lines == [f"{lines[0].partition(' ')[0]} {path}: plan: leg 1: expected a length above 0 m, got 0 m"]
