@@ -35,7 +35,10 @@ def site_of(wall: Wall) -> ReportSite:
     if file.depths_read_from != depths:
         height = "by column" if file.reference_height is None else f"{file.reference_height:g} m above it"
         depths = f"{depths} (stations were read from the {file.depths_read_from}, {height})"
-    return ReportSite(file.project, file.client, file.north, depths, file.height_datum, file.grid)
+    north = file.north
+    if file.stations_north != north:
+        north += f" north; stations were read from {file.stations_north}"
+    return ReportSite(file.project, file.client, north, depths, file.height_datum, file.grid)
 
 
 def column_records(wall: Wall, judgement: Judgement) -> list[ColumnRecord]:
@@ -105,6 +108,7 @@ def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
         ("Columns and joints", f"{len(wall.plans)} columns, {len(wall.pairs)} joints, {file.layout}"),
         ("Radius of a column", f"{' and '.join(f'{r:g}' for r in radii)} m{_scatter(wall)}"),
         ("Required thickness of a joint", f"{file.thickness:g} m"),
+        ("To be tight", tight_words(wall)),
         ("Tolerance", tolerance_text(file.tolerance)),
         (
             "P(anything open or too thin)",
@@ -128,6 +132,12 @@ def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
     good = judgement.verdict is WallVerdict.TIGHT
     verdict = f"The wall is {WORDS[judgement.verdict]}"
     return Document("Wall report", file.name, site.project or "as built", verdict, good, facts, sections, origin)
+
+
+def tight_words(wall: Wall) -> str:
+    """Depths between which the joints are to be tight."""
+    ends = {f"{top:g} to {bottom:g} m" for top, bottom in wall.tight_depths.tolist()}
+    return ends.pop() if len(ends) == 1 else "from the upper head to the lower toe of each joint"
 
 
 def _scatter(wall: Wall) -> str:

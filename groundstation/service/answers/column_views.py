@@ -51,7 +51,7 @@ def answer_column(k: RigModel, p: Parameters) -> ColumnAnswer:
 def design_axis(design: ColumnDesign) -> DesignAxis:
     """The design of the column."""
     pieces = 1 if design.plan is None else COURSE
-    along = design.length / pieces * np.arange(pieces + 1)
+    along = np.linspace(0.0, design.length, pieces + 1)
     return DesignAxis(
         inclination_deg=math.degrees(design.inclination),
         azimuth_deg=math.degrees(design.azimuth),

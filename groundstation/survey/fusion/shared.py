@@ -214,7 +214,7 @@ class SharedErrors:
 
     def depth_places_of(self, below: Sequence[int]) -> Places:
         """Places of the errors of a depth: scale, offset, and the length of each tube ``below`` from the bit up."""
-        key = ("depth", *below)
+        key: Name = ("depth", *below)
         known = self._known.get(key)
         if known is None:
             names: list[Name] = [("scale",), ("offset",), *(("length", tube) for tube in below)]

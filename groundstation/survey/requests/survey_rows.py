@@ -72,8 +72,8 @@ def station_at_depth(found: Analysis, md: float, sigma: float) -> dict[str, Any]
     tangents = station_tangents(found.record.inclination, found.azimuth)
     k = max(int(np.searchsorted(mds, md)) - 1, 0)
     leg = float(mds[k + 1] - mds[k])
-    place, _ = on_arc(tangents[k], tangents[k + 1], positions[k + 1] - positions[k], leg, float(md - mds[k]) / leg)
-    north, east, tvd = (positions[k] + place).tolist()
+    moved, _ = on_arc(tangents[k], tangents[k + 1], positions[k + 1] - positions[k], leg, float(md - mds[k]) / leg)
+    north, east, tvd = (positions[k] + moved).tolist()
     place = {"md_m": md, "north_m": north, "east_m": east, "tvd_m": tvd}
     return place | {"uncertainty": uncertainty_region(cov, sigma)}
 

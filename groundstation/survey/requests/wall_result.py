@@ -24,9 +24,10 @@ def wall_result(found: Wall, judgement: Judgement) -> dict[str, Any]:
     finite = np.where(np.isfinite(judged.thickness), judged.thickness, np.inf)
     doubtful_at, thinnest = worst_depths(judged), np.argmin(finite, axis=1)
     rows = [joint_row(found, judged, j, int(doubtful_at[j]), int(thinnest[j])) for j in range(len(judged.pairs))]
-    rows = [row | tight_row(found, j) for j, row in enumerate(rows)]
+    tight = [{"tight_from_m": top, "tight_to_m": bottom} for top, bottom in found.tight_depths.tolist()]
+    rows = [row | ends for row, ends in zip(rows, tight, strict=True)]
     joint, depth = worst_joint(judged)
-    worst_row = joint_row(found, judged, joint, depth, int(thinnest[joint])) | tight_row(found, joint)
+    worst_row = joint_row(found, judged, joint, depth, int(thinnest[joint])) | tight[joint]
     return {
         "wall": found.file.name,
         "verdict": judgement.verdict.value,
@@ -173,12 +174,6 @@ def joint_row(found: Wall, judged: Joints, joint: int, depth: int, thinnest: int
         "moved_apart_cm": json_number(100.0 * math.hypot(north, east)),
         "direction_deg": json_number(math.degrees(math.atan2(east, north)) % 360.0),
     }
-
-
-def tight_row(found: Wall, joint: int) -> dict[str, float]:
-    """Depths between which a joint is to be tight."""
-    top, bottom = found.tight_depths[joint].tolist()
-    return {"tight_from_m": top, "tight_to_m": bottom}
 
 
 def json_number(value: float) -> float | None:

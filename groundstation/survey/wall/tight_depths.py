@@ -81,24 +81,28 @@ def check_reach(designs: Sequence[ColumnDesign], frame: Array, pairs: Pairs, ran
         Names the joint, its column, the depths, and what would help.
     """
     ends = _ends(designs, frame)[:, :, 1]
-    for pair, (top, bottom) in zip(pairs.tolist(), ranges.tolist(), strict=True):
-        joint = "-".join(designs[k].name for k in pair)
-        if not top < bottom:
-            raise SurveyError(
-                f"the design of joint {joint} has no depth in which it is to be tight: it begins at {top:g} m and ends "
-                f"at {bottom:g} m"
-            )
-        where = f"joint {joint} is to be tight from {top:g} to {bottom:g} m, yet by its design column"
-        low = max(pair, key=lambda k: ends[k, 0])
-        short = min(pair, key=lambda k: ends[k, 1])
-        head, toe = float(ends[low, 0]), float(ends[short, 1])
-        if head > top + TOE:
-            raise SurveyError(
-                f"{where} {designs[low].name} begins at {head:g} m: it opens at the top; expected a head at {top:g} m, "
-                f"or tight_from_m = {head:g}"
-            )
-        if toe < bottom - TOE:
-            raise SurveyError(
-                f"{where} {designs[short].name} ends at {toe:g} m; expected a toe at {bottom:g} m, "
-                f"or tight_to_m = {toe:g}"
-            )
+    heads, toes = ends[pairs, 0].max(axis=1), ends[pairs, 1].min(axis=1)
+    top, bottom = ranges.T
+    wrong = np.flatnonzero(~(top < bottom) | (heads > top + TOE) | (toes < bottom - TOE))
+    if len(wrong):
+        j = int(wrong[0])
+        raise SurveyError(_short_of(designs, ends, pairs[j].tolist(), float(top[j]), float(bottom[j])))
+
+
+def _short_of(designs: Sequence[ColumnDesign], ends: Array, pair: list[int], top: float, bottom: float) -> str:
+    """What a joint that is to be tight from ``top`` to ``bottom`` lacks by the design of its two columns."""
+    joint = "-".join(designs[k].name for k in pair)
+    if not top < bottom:
+        return (
+            f"the design of joint {joint} has no depth in which it is to be tight: it begins at {top:g} m and ends at "
+            f"{bottom:g} m"
+        )
+    where = f"joint {joint} is to be tight from {top:g} to {bottom:g} m, yet by its design column"
+    low, short = max(pair, key=lambda k: ends[k, 0]), min(pair, key=lambda k: ends[k, 1])
+    head, toe = float(ends[low, 0]), float(ends[short, 1])
+    if head > top + TOE:
+        return (
+            f"{where} {designs[low].name} begins at {head:g} m: it opens at the top; expected a head at {top:g} m, "
+            f"or tight_from_m = {head:g}"
+        )
+    return f"{where} {designs[short].name} ends at {toe:g} m; expected a toe at {bottom:g} m, or tight_to_m = {toe:g}"

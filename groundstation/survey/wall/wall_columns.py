@@ -27,6 +27,7 @@ from groundstation.survey.wall.as_built import (
 )
 from groundstation.survey.wall.column_deviation import ColumnDesign
 from groundstation.survey.wall.plane_errors import PlaneErrors
+from groundstation.survey.wall.tight_depths import TightRange
 from groundstation.survey.well.ellipsoid import check_covariance
 from groundstation.survey.well.error_columns import ErrorColumns, error_columns
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
@@ -103,6 +104,7 @@ class Assumptions:
     step: float = 0.5  # m between planes
     layers: tuple[Layer, ...] = (Layer(-math.inf, None, 0.0),)
     radius_correlation: float = 1.0  # of two columns in one layer
+    tight: TightRange = field(default_factory=TightRange)  # the planes lie in it
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +148,7 @@ def build_wall(
     """
     frame = plane_frame([plan.design for plan in plans]) if whole is None else whole.frame
     ways = [_way(plan, hole) for plan, hole in zip(plans, holes, strict=True)]
-    depths = _depths(plans, frame, assumed.step) if whole is None else whole.columns.depths
+    depths = _depths(plans, frame, assumed) if whole is None else whole.columns.depths
     count = len(plans)
     centres = np.full((count, len(depths), 2), np.nan)
     ends, surveyed = np.full((2, count), -np.inf)
@@ -228,12 +230,14 @@ def _last_survey(way: Way) -> int:
     return int(np.flatnonzero(way.md <= way.surveyed_md + SAME_END)[-1])
 
 
-def _depths(plans: Sequence[ColumnPlan], frame: Array, step: float) -> Array:
-    """Planes from the first head to the last toe, at most ``step`` apart."""
+def _depths(plans: Sequence[ColumnPlan], frame: Array, assumed: Assumptions) -> Array:
+    """Planes at most a step apart, from the first head to the last toe or over what is stated to be tight."""
     heads = np.array([plan.design.head for plan in plans])
     toes = heads + np.array([plan.design.length * plan.design.axis for plan in plans])
     top, bottom = float(np.min(heads @ frame[2])), float(np.max(toes @ frame[2]))
-    return np.append(np.arange(top, bottom - 1e-3, step), bottom)
+    stated = assumed.tight
+    top, bottom = top if stated.top is None else stated.top, bottom if stated.bottom is None else stated.bottom
+    return np.append(np.arange(top, bottom - 1e-3, assumed.step), bottom)
 
 
 def _alike(plans: Sequence[ColumnPlan], ways: Sequence[Way | None]) -> list[list[int]]:

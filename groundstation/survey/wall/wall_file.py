@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 import tomllib
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -91,7 +91,6 @@ class WallFile:
     north: str = "site"  # that designs, positions and every answer count from
     stations_north: str = "site"
     stations_turn: float = 0.0  # rad, azimuth of the north that stations count from, from ``north``
-    tight: TightRange = field(default_factory=TightRange)
     depths_read_from: str = DEPTHS_FROM[0]  # of stations and drilled depths
     depth_reference: str = DEPTHS_FROM[0]  # of all answers: the heads' own
     reference_height: float | None = None  # m, of the former above the latter
@@ -138,7 +137,7 @@ class Wall:
     @property
     def tight_depths(self) -> Array:
         """First and last depth (joints, 2) at which each joint is to be tight, m."""
-        return tight_depths([plan.design for plan in self.plans], self.built.frame, self.pairs, self.file.tight)
+        return tight_depths([plan.design for plan in self.plans], self.built.frame, self.pairs, self.file.assumed.tight)
 
     @property
     def asked(self) -> npt.NDArray[np.bool_]:
@@ -194,6 +193,7 @@ def read_wall_file(path: Path) -> WallFile:
         values.get("depth_step_m", 0.5),
         _layers(path, layers, values.get("radius_cv", 0.0)),
         values.get("radius_correlation", 1.0),
+        tight,
     )
     read_from = _one_of(path, values, "depth_reference", DEPTHS_FROM, DEPTHS_FROM[0])
     return WallFile(
@@ -220,7 +220,6 @@ def read_wall_file(path: Path) -> WallFile:
         str(values.get("north", "site")),
         str(values.get("stations_north", values.get("north", "site"))),
         stations_north - north,
-        tight,
         read_from,
         _one_of(path, values, "answer_depth_reference", DEPTHS_FROM, read_from),
         values.get(REFERENCE_HEIGHT),
@@ -407,7 +406,7 @@ def _check_design(
     alone = pairs[[j for j in range(len(pairs)) if j not in helped]]
     designs = [plan.design for plan in plans]
     try:
-        check_reach(designs, built.frame, alone, tight_depths(designs, built.frame, alone, file.tight))
+        check_reach(designs, built.frame, alone, tight_depths(designs, built.frame, alone, file.assumed.tight))
     except SurveyError as error:
         raise SurveyError(f"{file.path}: {error}") from None
     a, b = pairs[:, 0], pairs[:, 1]

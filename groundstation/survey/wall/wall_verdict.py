@@ -220,7 +220,8 @@ def _design_findings(columns: Columns, found: Joints, required: float, allowed: 
     with np.errstate(invalid="ignore"):
         good = (found.thickness >= required) & (found.probability <= allowed)
     bad = ~good & (found.states != ColumnState.OUTSIDE)
-    for j, pair in enumerate(found.pairs):
+    for j in np.flatnonzero(np.any(bad, axis=1)).tolist():
+        pair = found.pairs[j]
         name = joint_name(columns, pair)
         for k in pair.tolist():
             for first, last in true_runs(bad[j] & (columns.states[k] == ColumnState.OUTSIDE)):

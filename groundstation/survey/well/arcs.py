@@ -21,7 +21,7 @@ STRAIGHT = 1e-9  # rad, of a bend
 def bend_angles(upper: Array, lower: Array) -> Array:
     """Angles (...,), 0 to pi rad, between tangents (..., 3); exact where they are small."""
     cross = np.cross(upper, lower)
-    return np.arctan2(np.sqrt((cross * cross).sum(axis=-1)), (upper * lower).sum(axis=-1))
+    return np.asarray(np.arctan2(np.sqrt((cross * cross).sum(axis=-1)), (upper * lower).sum(axis=-1)))
 
 
 def arc_displacements(lengths: Array, upper: Array, lower: Array) -> Array:

@@ -163,7 +163,7 @@ class HolePair:
 
 def _variance(errors: LegErrors, leg: npt.NDArray[np.intp], fraction: Array, unit: Array) -> Array:
     """Variance (k,) along unit vectors (k, 3)."""
-    return np.maximum(np.einsum("ki,kij,kj->k", unit, errors.covariance(leg, fraction), unit), 0.0)
+    return np.asarray(np.maximum(np.einsum("ki,kij,kj->k", unit, errors.covariance(leg, fraction), unit), 0.0))
 
 
 def _arcs(hole: ClearanceHole) -> HoleArcs:

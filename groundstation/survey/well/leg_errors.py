@@ -152,4 +152,4 @@ def covariance_at(found: Uncertainty, md: float) -> Array:
     f = float((md - mds[k]) / (mds[k + 1] - mds[k]))
     errors = leg_errors(found.survey, found.legs, found.site, slot_allowance=found.slot_allowance)
     inside = errors.covariance(np.array([k], np.intp), np.array([f]))[0]
-    return inside + (1.0 - f) ** 2 * found.cov[0] if k == 0 else inside
+    return np.asarray(inside + (1.0 - f) ** 2 * found.cov[0] if k == 0 else inside)

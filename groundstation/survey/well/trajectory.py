@@ -415,6 +415,6 @@ class Trajectory:
         if self.method is not Method.MINIMUM_CURVATURE:
             return
         tangents = tangents_of(directions)
-        for leg in np.flatnonzero(bend_angles(tangents[:-1], tangents[1:]) > math.pi - OPPOSITE):
+        for leg in np.flatnonzero(bend_angles(tangents[:-1], tangents[1:]) > math.pi - OPPOSITE).tolist():
             above, below = mds[leg], mds[leg + 1]
             raise SurveyError(f"trajectory: the hole turns back on itself between {above:g} and {below:g} m")

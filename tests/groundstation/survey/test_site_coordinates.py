@@ -24,10 +24,10 @@ INCLINATION = [1.0, 14.0, 35.0, 62.0, 95.0]
 TRUE_AZIMUTH = [310.0, 325.0, 2.0, 40.0, 71.0]
 
 
-def coordinates_by_hand() -> np.ndarray:
-    """Northing, easting and height by arcs in complex numbers, azimuths from grid north."""
+def offsets_by_hand() -> np.ndarray:
+    """Northing, easting and height from the origin's by arcs in complex numbers, azimuths from grid north."""
     place, down = 0j, 0.0
-    out = [(ORIGIN[0], ORIGIN[1], ORIGIN[2])]
+    out = [(0.0, 0.0, 0.0)]
     for k in range(len(MD) - 1):
         i0, i1 = INCLINATION[k] * DEG, INCLINATION[k + 1] * DEG
         a0, a1 = ((TRUE_AZIMUTH[n] - ANGLES["grid"]) * DEG for n in (k, k + 1))
@@ -36,7 +36,7 @@ def coordinates_by_hand() -> np.ndarray:
         half = (MD[k + 1] - MD[k]) / bend * math.tan(bend / 2.0)
         place += half * (math.sin(i0) * cmath.exp(1j * a0) + math.sin(i1) * cmath.exp(1j * a1))
         down += half * (math.cos(i0) + math.cos(i1))
-        out.append((ORIGIN[0] + SCALE * place.real, ORIGIN[1] + SCALE * place.imag, ORIGIN[2] - down))
+        out.append((SCALE * place.real, SCALE * place.imag, -down))
     return np.array(out)
 
 
@@ -55,16 +55,20 @@ def frame(north: str, answer: str | None, **more: Any) -> FrameRequest:
 
 @pytest.mark.parametrize("north", list(ANGLES))
 @pytest.mark.parametrize("answer", [None, "true", "grid", "magnetic"])
-def test_a_record_of_any_north_has_one_place_in_the_grid(tmp_path: Path, north: str, answer: str | None) -> None:
-    found = answer_survey(SurveyRequest(record(tmp_path, north), frame=frame(north, answer)))
+@pytest.mark.parametrize(
+    ("origin", "within"), [((0.0, 0.0, 0.0), 1e-9), (ORIGIN, 2e-9)], ids=["zero", "millions have nine digits left"]
+)
+def test_a_record_of_any_north_has_one_place_in_the_grid(
+    tmp_path: Path, north: str, answer: str | None, origin: tuple[float, float, float], within: float
+) -> None:
+    found = answer_survey(SurveyRequest(record(tmp_path, north), frame=frame(north, answer, origin=origin)))
     assert (found.result["north"], found.result["coordinates_north"]) == (answer or "grid", "grid")
     rows = found.result["stations"]
     places = [[row[key] for key in ("northing_m", "easting_m", "height_m")] for row in rows]
-    # millions of metres have nine digits behind the point, so the offsets are compared
-    np.testing.assert_allclose(np.array(places) - ORIGIN, coordinates_by_hand() - ORIGIN, rtol=0.0, atol=2e-9)
+    np.testing.assert_allclose(np.array(places) - origin, offsets_by_hand(), rtol=0.0, atol=within)
     if answer is None:  # all coordinates of the answer are in one frame then
         offsets = np.array([[row[key] for key in ("north_m", "east_m", "tvd_m")] for row in rows])
-        np.testing.assert_allclose(offsets[:, 0] * SCALE, np.array(places)[:, 0] - ORIGIN[0], atol=2e-9)
+        np.testing.assert_allclose(offsets[:, 0] * SCALE, np.array(places)[:, 0] - origin[0], rtol=0.0, atol=within)
         azimuth = [row["azimuth_deg"] for row in rows]
         np.testing.assert_allclose(azimuth, np.mod(np.array(TRUE_AZIMUTH) - ANGLES["grid"], 360.0), atol=1e-9)
     assert station_table_text(rows, found.found.frame).splitlines()[1].endswith(",grid")

@@ -7,12 +7,16 @@ import numpy as np
 import pytest
 
 from groundstation.errors import SurveyError
+from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.wall.as_built import ColumnState
+from groundstation.survey.wall.column_deviation import ColumnDesign
 from groundstation.survey.wall.tight_depths import TightRange
+from groundstation.survey.wall.wall_columns import Assumptions, ColumnPlan, ColumnSurvey, build_wall
 from groundstation.survey.wall.wall_file import Wall, judge_wall, read_wall
 from groundstation.survey.wall.wall_verdict import FindingKind, Judgement, WallVerdict, judge_columns
 
 HEADS = "column,north_m,east_m,down_m,length_m,inclination_deg,azimuth_deg\n"
+SQUARE = [(0.0, 0.0), (0.0, 0.7), (0.7, 0.0), (0.7, 0.7)]
 LONG = ("A", 0.0, 0.0, 0.0, 20.0, 0.0, 0.0)
 
 
@@ -71,6 +75,10 @@ def test_over_the_depth_that_is_stated_they_are_tight(tmp_path: Path) -> None:
     ("more", "named"),
     [
         ("tight_from_m = 18\ntight_to_m = 5\n", "tight_from_m: expected a depth above tight_to_m, 5 m, got 18 m"),
+        (
+            "tight_from_m = 50\n",
+            "no depth in which it is to be tight: it begins at 50 m and ends at 20 m",
+        ),
         ("tight_to_m = 40\n", "column A ends at 20 m; expected a toe at 40 m"),
         ("tight_from_m = -3\n", "column A begins at 0 m: it opens at the top; expected a head at -3 m"),
         ('tight_to_m = "deep"\n', "tight_to_m: expected a finite number, got 'deep'"),
@@ -83,10 +91,14 @@ def test_a_range_that_no_design_reaches_is_refused(tmp_path: Path, more: str, na
     assert "\n" not in str(error.value)
 
 
-def test_without_a_range_a_joint_is_asked_for_where_either_design_is(tmp_path: Path) -> None:
+def test_without_a_range_a_joint_is_asked_for_where_either_design_is() -> None:
     """What has no file to be refused, as a wall that is judged while it is drilled, is open there."""
-    wall = read_wall(made(tmp_path, [LONG, beside("B", 1, length=10.0)], "tight_to_m = 10\n"))
-    found = judge_columns(wall.columns, wall.pairs, 0.8)
+    plans, holes = [], []
+    for name, east, length in (("A", 0.0, 20.0), ("B", 0.75, 10.0)):
+        plans.append(ColumnPlan(ColumnDesign(name, (0.0, east, 0.0), length=length), load_tool("relay")))
+        holes.append(ColumnSurvey(np.array([0.0, 3.0, length]), np.zeros(3), np.zeros(3)))
+    columns = build_wall(plans, holes, Assumptions()).columns
+    found = judge_columns(columns, np.array([[0, 1]]), 0.8)
     assert found.verdict is WallVerdict.NOT_TIGHT
     (finding,) = found.findings
     assert (finding.kind, finding.what, finding.top, finding.bottom) == (FindingKind.MISSING, "A-B", 10.5, 20.0)
@@ -153,3 +165,14 @@ def test_a_wall_of_one_column_and_names_that_differ_by_case_are_refused(tmp_path
     stations.write_text(stations.read_text().replace("B,", "b,"))
     with pytest.raises(SurveyError, match="column b is not among the heads; B is"):
         read_wall(path)
+
+
+def test_a_grid_is_covered_over_the_depths_that_are_stated(tmp_path: Path) -> None:
+    """Above 4 m two of four columns are not there: a void that is not asked about."""
+    rows = [(name, *place, 4.0 * (name in "BC"), 8.0, 0.0, 0.0) for name, place in zip("ABCD", SQUARE, strict=True)]
+    more = 'layout = "grid"\nspacing_m = 0.7\ndepth_step_m = 1\n'
+    wall, found = judged(made(tmp_path, rows, more + "tight_from_m = 4\ntight_to_m = 8\n"))
+    assert (found.verdict, found.voids) == (WallVerdict.TIGHT, [])
+    np.testing.assert_array_equal(wall.columns.depths, [4.0, 5.0, 6.0, 7.0, 8.0])
+    with pytest.raises(SurveyError, match="begins at 4 m: it opens at the top"):
+        read_wall(made(tmp_path, rows, more))
