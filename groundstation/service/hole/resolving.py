@@ -73,7 +73,7 @@ class Resolver:
             each = zip(measurements, mds, above, below, strict=True)  # which of them it is comes out by itself
             return [self.resolve_measurements([m], [md], [over], [under])[0] for m, md, over, under in each]
         stops.rows["md"] = mds
-        stops.depth_places = [self._shared.depth_places_of(tubes) for tubes in below]
+        stops.depth_places = [*map(self._shared.depth_places_of, below)]
         return [(stops, row) for row in range(len(measurements))]
 
     def _resolve_together(

@@ -46,6 +46,7 @@ class SurveyedHole:
         self._config = config
         self._shared = shared
         self._design = config.design
+        self._depth_errors = config.depth_errors
         self._stops = ResolvedStops()
         self._station_of: list[SurveyStation] = []  # of each of its rows
         self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
@@ -199,7 +200,7 @@ class SurveyedHole:
             SurveyStation.add_newest(grown, newest)
 
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
-        self._trajectory.put(self._directions(changed), {one.md: self._depth_of(one) for one in changed})
+        self._trajectory.put(self._directions(changed), self._depths(changed))
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)
         if worst is None:
@@ -225,11 +226,13 @@ class SurveyedHole:
         self._carried = dict(zip(mds, carry_directions(self._config.collar, directions, places), strict=True))
         return [(md, carried.direction) for md, carried in self._carried.items()]
 
-    def _depth_of(self, station: SurveyStation) -> StationDepth:
-        """Error of the depth of a station."""
-        places = [self._stops.depth_places[row] for row in station.stops.rows]
-        config = self._config
-        return mean_depth(station.md, places, config.depth_errors, config.tube_length, self._shared.count)
+    def _depths(self, stations: Sequence[SurveyStation]) -> dict[float, StationDepth]:
+        """Errors of the depths of stations, by these (m)."""
+        found, places_of = {}, self._stops.depth_places.__getitem__
+        for station in stations:
+            places = [*map(places_of, station.stops.rows)]
+            found[station.md] = mean_depth(station.md, places, self._depth_errors, self._config.tube_length)
+        return found
 
     def _deviate(self) -> Deviations:
         """Deviations of the trajectory as it is drawn."""

@@ -20,8 +20,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
 from groundstation.survey.path.curvature_process import CURVATURE, DIRECTION, OFFSET, process_step
 
+Array = npt.NDArray[np.float64]
 SAME = 6  # decimals of a length (m), to which a leg is as another
 
 
@@ -45,17 +49,21 @@ class LegWander:
         """What the place at a share of a leg (m) does against the arc."""
         return arc_moment(round(leg, SAME), round(share, SAME), self.length)
 
+    def moments(self, legs: Array) -> Array:
+        """Moments (n, 4) at the ends of legs (n,), m."""
+        rounded = legs.round(SAME).tolist()
+        known: dict[float, ArcMoment] = {}
+        for leg in rounded:
+            if leg not in known:
+                known[leg] = arc_moment(leg, 1.0, self.length)
+        return np.array([*map(known.__getitem__, rounded)])
+
     def grown(self, memory: float, moment: ArcMoment) -> float:
         """Variance (m^2) that a leg adds to what those above have gathered; ``memory`` is their c.
 
         Where the leg undoes more than it adds nothing is taken off: the planes of two legs are not quite the same.
         """
         return self.std**2 * max(moment.variance + 2.0 * moment.with_start * memory, 0.0)
-
-
-def carry_memory(memory: float, moment: ArcMoment) -> float:
-    """The c of the next leg."""
-    return moment.kept * memory + moment.with_end
 
 
 @lru_cache(maxsize=4096)

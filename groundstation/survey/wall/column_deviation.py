@@ -228,7 +228,7 @@ def axis_deviations(md: Array, positions: Array, covs: Array, design: ColumnDesi
     along = (offsets * design.axis).sum(axis=1)
     first, second = (offsets * design.across[0]).sum(axis=1), (offsets * design.across[1]).sum(axis=1)
     across = np.stack([first, second], axis=1)
-    limit = _limits(design.tolerance, along)
+    limit = design.tolerance.start + design.tolerance.growth * np.maximum(along, 0.0)
     return Deviations(md.copy(), along, across, design.across @ covs @ design.across.T, limit)
 
 
@@ -238,11 +238,8 @@ def _plan_deviations(md: Array, offsets: Array, covs: Array, plan: WellPlan, tol
     across = planes_across(nearest.tangents)
     apart = (across * (offsets - nearest.points)[:, None]).sum(axis=2)
     turned = across @ covs @ across.transpose(0, 2, 1)
-    return Deviations(md.copy(), nearest.along, apart, turned, _limits(tolerance, nearest.along))
-
-
-def _limits(tolerance: Tolerance, along: Array) -> Array:
-    return np.asarray(tolerance.start + tolerance.growth * np.maximum(along, 0.0))
+    limit = tolerance.start + tolerance.growth * np.maximum(nearest.along, 0.0)
+    return Deviations(md.copy(), nearest.along, apart, turned, limit)
 
 
 def planes_across(tangents: Array) -> Array:

@@ -12,7 +12,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.well.methods import OPPOSITE, ratio_factor
+from groundstation.survey.well.methods import OPPOSITE, SMALL
 
 Array = npt.NDArray[np.float64]
 STRAIGHT = 1e-9  # rad, of a bend
@@ -30,7 +30,9 @@ def arc_displacements(lengths: Array, upper: Array, lower: Array) -> Array:
     Where the two are opposite no arc is defined: such a leg leads nowhere, as the mean of its tangents does.
     """
     bends = bend_angles(upper, lower)
-    factors = np.where(bends > math.pi - OPPOSITE, 1.0, ratio_factor(np, np.minimum(bends, math.pi - OPPOSITE)))
+    bent = (bends > SMALL) & (bends < math.pi - OPPOSITE)
+    safe = np.where(bent, bends, 1.0)
+    factors = np.where(bent, 2.0 / safe * np.tan(0.5 * safe), 1.0 + np.where(bends < SMALL, bends * bends / 12.0, 0.0))
     return np.asarray((0.5 * lengths * factors)[:, None] * (upper + lower))
 
 

@@ -20,7 +20,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from functools import lru_cache
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -55,9 +56,7 @@ class StationDepth:
 EXACT: Final = StationDepth(Packed(np.zeros((1, 0))), 0.0)
 
 
-def mean_depth(
-    md: float, places: Sequence[Places], errors: DepthErrors, tube_length: float, width: int
-) -> StationDepth:
+def mean_depth(md: float, places: Sequence[Places], errors: DepthErrors, tube_length: float) -> StationDepth:
     """Depth error of a station that several nodes read, one reading as good as another.
 
     Parameters
@@ -65,15 +64,31 @@ def mean_depth(
     md : m
     places : of the columns of each reading: scale, offset, and the length of each tube below its node from the bit up
     tube_length : m, as it is told
-    width : number of shared columns that are known
     """
-    below = np.array([len(own) - OF_ALL for own in places])
-    deepest = max(places, key=len)
+    counts = (*map(len, places),)
+    count, bit = len(places), md + tube_length * (sum(counts) / len(places) - OF_ALL)
+    parts = reading_parts(counts, max(places, key=len).tobytes())
+    values = errors.tube_std * parts.tubes + errors.offset_std * parts.offset + errors.scale_std * bit * parts.scale
+    return StationDepth(Packed.of(parts.places, values, parts.width), errors.reading_std**2 / count)
+
+
+class ReadingParts(NamedTuple):
+    """In which part of the readings of a station each error is: columns (1, c) at ascending places (c,)."""
+
+    width: int  # of the columns up to the last of them
+    places: Places
+    scale: Array
+    offset: Array
+    tubes: Array
+
+
+@lru_cache(maxsize=4096)
+def reading_parts(counts: tuple[int, ...], deepest: bytes) -> ReadingParts:
+    """Parts for readings with so many places each; ``deepest`` are those of the reading that has most."""
+    places = np.frombuffer(deepest, np.intp)
+    parts = np.zeros((3, len(places)))
+    parts[0, 0] = parts[1, 1] = 1.0
     # the length of a tube is in the readings of all that have it below them
-    passed = np.cumsum(np.bincount(below, minlength=len(deepest) - OF_ALL + 1)[::-1])[::-1][1:]
-    bit = md + tube_length * float(below.mean())
-    columns = np.concatenate(
-        [[errors.scale_std * bit, errors.offset_std], errors.tube_std / len(places) * passed[: len(deepest) - OF_ALL]]
-    )
-    order = np.argsort(deepest)
-    return StationDepth(Packed.of(deepest[order], columns[None, order], width), errors.reading_std**2 / len(places))
+    parts[2, OF_ALL:] = (np.array(counts)[:, None] > np.arange(OF_ALL, len(places))).mean(axis=0)
+    order = np.argsort(places)
+    return ReadingParts(int(places.max()) + 1, places[order], *parts[:, None, order])

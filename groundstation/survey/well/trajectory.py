@@ -18,7 +18,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import Final
 
 import numpy as np
@@ -28,7 +28,7 @@ from groundstation.errors import SurveyError
 from groundstation.survey.fusion.resolve import Direction, direction_angles
 from groundstation.survey.fusion.shared import Packed, add_shared_errors, packed_of
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
-from groundstation.survey.path.leg_wander import LegWander, carry_memory
+from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.well.arcs import arc_displacements, bend_angles, on_arc
 from groundstation.survey.well.depth_errors import EXACT, StationDepth
 from groundstation.survey.well.methods import OPPOSITE, Method, leg_displacement
@@ -45,13 +45,15 @@ from groundstation.survey.well.trajectory_rows import (
 
 Array = npt.NDArray[np.float64]
 BLOCK = 64  # stations from mark to mark
+COV, PLACES, VALUES = map(attrgetter, ("cov", "places", "values"))
+DEPTH_PLACES, DEPTH_VALUES = map(attrgetter, ("columns.places", "columns.values"))
 NONE: Final = Packed(np.zeros((2, 0)))
 UNKNOWN: Final = np.zeros((3, 0))
 NOTHING: Final = np.zeros(0)
 FROM_ZERO: Final = np.zeros(1, np.intp)
 STEADY: Final = LegWander(0.0, 1.0)  # a path that does what its arcs do
 ALL_EXACT: Final[Mapping[float, StationDepth]] = {}
-TURNED_BACK = math.radians(120.0)  # bend of one leg, beyond which it is no hole any more
+TURNED_BACK = math.cos(math.radians(120.0))  # of the bend of one leg, beyond which it is no hole any more
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,8 +154,7 @@ class Trajectory:
     def turned_back(self) -> list[float]:
         """Depths (m) of the stations that point back against the one above: the hole is not what is drawn there."""
         tangents = self._rows["tangent"][: len(self)]
-        bends = bend_angles(tangents[:-1], tangents[1:])
-        return [float(md) for md in self.md[1:][bends > TURNED_BACK]]
+        return [float(md) for md in self.md[1:][(tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK]]
 
     def append(self, md: float, direction: Direction, depth: StationDepth = EXACT) -> TrajectoryPoint:
         """Add the station at ``md`` (m).
@@ -306,12 +307,12 @@ class Trajectory:
             self._down[place] = (jacobian @ columns.values)[2].copy()
         rows, at = self._rows, np.array(places)
         rows["tangent"][at] = tangents
-        rows["own"][at] = jacobians @ np.array([one.cov for one in directions]) @ jacobians.transpose(0, 2, 1)
-        depths = [self._depths[place] for place in places]
-        rows["width"][at] = [max(one.width, own.columns.width) for one, own in zip(directions, depths, strict=True)]
-        rows["count"][at] = [len(self._columns[place].places) for place in places]
-        rows["depths"][at] = [len(own.columns.places) for own in depths]
-        rows["depth_var"][at] = [own.own_var for own in depths]
+        rows["own"][at] = jacobians @ np.array([*map(COV, directions)]) @ jacobians.transpose(0, 2, 1)
+        for place in places:
+            row, columns, depth = rows[place], self._columns[place], self._depths[place]
+            row["width"] = max(columns.width, depth.columns.width)
+            row["count"], row["depths"] = len(columns.places), len(depth.columns.places)
+            row["depth_var"] = depth.own_var
 
     def _draw(self, first: int) -> None:
         """Compute the positions from a place on."""
@@ -323,7 +324,7 @@ class Trajectory:
         end = len(self)
         rows = self._rows[begin:end]
         legs = self._legs(rows)
-        rows["position"] = np.add.accumulate([rows["position"][0], *legs])
+        rows["position"] = np.add.accumulate(np.concatenate([rows["position"][:1], legs]))
         self._go_along(rows, legs)
         followed = self._follow(self._sums, begin, end - 1, with_columns=self._keeps_columns)
         rows["cov"][1:] = followed.covs + (rows["path"] + rows["kinks"] + last_depths(rows))[1:]
@@ -336,18 +337,20 @@ class Trajectory:
 
     def _go_along(self, rows: npt.NDArray[np.void], legs: Array) -> None:
         """Compute what depths and the path between stations come to, from the first of some rows on."""
+        from groundstation.survey.well.kernels.position_errors import (
+            gather_path,  # reading alone needs no compiler
+        )
+
         lengths = np.diff(rows["md"])
         rows["along"][1:] = legs / lengths[:, None]
         bent = rows["along"][:-1] - rows["along"][1:]
         kinks = rows["depth_var"][:-1, None, None] * (bent[:, :, None] * bent[:, None])
-        rows["kinks"] = np.add.accumulate([rows["kinks"][0], *kinks])
-        memory, grown = rows["memory"].item(0), []
-        for place, leg in enumerate(lengths.tolist(), 1):
-            moment = self._wander.moment(leg)
-            grown.append(self._wander.grown(memory, moment))
-            rows["memory"][place] = memory = carry_memory(memory, moment)
-        left = np.array(grown)[:, None, None] * across_of(rows["along"][1:])
-        rows["path"] = np.add.accumulate([rows["path"][0], *left])
+        memories, variances = np.empty((2, len(lengths)))
+        gather_path(self._wander.moments(lengths), rows["memory"].item(0), self._wander.std, memories, variances)
+        rows["memory"][1:] = memories
+        left = variances[:, None, None] * across_of(rows["along"][1:])
+        for name, steps in (("kinks", kinks), ("path", left)):
+            rows[name] = np.add.accumulate(np.concatenate([rows[name][:1], steps]))
 
     def _follow(self, sums: TrajectorySums, begin: int, end: int, *, with_columns: bool) -> Followed:
         """Continue ``sums`` from one place to another."""
@@ -356,18 +359,18 @@ class Trajectory:
         )
 
         rows, columns = self._rows[begin : end + 1], self._columns[begin : end + 1]
-        depths = [own.columns for own in self._depths[begin : end + 1]]
+        depths = self._depths[begin : end + 1]
         known = max(sums.passed.shape[1], int(rows["width"][0]))
         widths = np.maximum(np.maximum.accumulate(rows["width"][1:]), known)
         starts = np.concatenate([FROM_ZERO, rows["count"].cumsum()])
-        places = np.concatenate([one.places for one in columns]).astype(np.intp, copy=False)
+        places = np.concatenate([*map(PLACES, columns)]).astype(np.intp, copy=False)
         lean, down = (
-            np.concatenate([one.values for one in columns], axis=1),
+            np.concatenate([*map(VALUES, columns)], axis=1),
             np.concatenate(self._down[begin : end + 1]),
         )
         depth_starts = np.concatenate([FROM_ZERO, rows["depths"].cumsum()])
-        depth_places = np.concatenate([one.places for one in depths]).astype(np.intp, copy=False)
-        by_depth = np.concatenate([one.values[0] for one in depths])
+        depth_places = np.concatenate([*map(DEPTH_PLACES, depths)]).astype(np.intp, copy=False)
+        by_depth = np.concatenate([*map(DEPTH_VALUES, depths)], axis=1)[0]
         alongs = rows["along"][1:].copy()
         legs = np.diff(rows["md"])
         ends = 0.5 * legs

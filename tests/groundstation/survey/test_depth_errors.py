@@ -104,7 +104,7 @@ def test_the_region_holds_where_the_nodes_really_were(inclination_deg: float) ->
     station_depths, truth, directions = {}, [], []
     for station, rows in enumerate(depths, 1):
         md = SPACING * station
-        station_depths[md] = mean_depth(md, below[: len(rows)], ERRORS, SPACING, shared.count)
+        station_depths[md] = mean_depth(md, below[: len(rows)], ERRORS, SPACING)
         truth.append(hole.at(hole.positions, rows.mean(axis=0)))
         seen = np.stack([hole.at(hole.tangents, own) for own in rows])
         directions.append(list(read_directions(seen, generator)))
@@ -155,7 +155,7 @@ def hole_of(count: int, shared: SharedErrors) -> Trajectory:
     drawn = Trajectory(wander=WANDER, keeps_columns=True)
     below = [shared.depth_places_of(list(range(1, n + 1))) for n in range(count)]
     stations = [station(2.0 * k, 0.1 + 0.02 * k, 0.3 * k) for k in range(1, count + 1)]
-    depths = {md: mean_depth(md, below[: 1 + k % 4], ERRORS, 2.0, shared.count) for k, (md, _) in enumerate(stations)}
+    depths = {md: mean_depth(md, below[: 1 + k % 4], ERRORS, 2.0) for k, (md, _) in enumerate(stations)}
     drawn.extend(stations, depths)
     return drawn
 
@@ -190,7 +190,7 @@ def test_every_source_moves_a_straight_hole_along_itself_as_its_formula_says() -
     below = [shared.depth_places_of(list(range(1, n + 1))) for n in range(3)]
     drawn = Trajectory(collar=known_direction(inclination, 0.0))
     stations = [(md, known_direction(inclination, 0.0)) for md in (2.0, 4.0, 6.0)]
-    drawn.extend(stations, {md: mean_depth(md, below, ERRORS, 2.0, shared.count) for md, _ in stations})
+    drawn.extend(stations, {md: mean_depth(md, below, ERRORS, 2.0) for md, _ in stations})
     for place, md in enumerate((2.0, 4.0, 6.0), 1):
         scale = ERRORS.scale_std * (md + 2.0)  # its readings come from bits 0, 2 and 4 m deeper
         tubes = ERRORS.tube_std**2 * ((2.0 / 3.0) ** 2 + (1.0 / 3.0) ** 2)
@@ -214,7 +214,7 @@ def test_stations_put_one_by_one_are_as_the_whole_hole() -> None:
     put = Trajectory(wander=WANDER)
     for k in reversed(range(1, count + 1)):
         md, direction = station(2.0 * k, 0.1 + 0.02 * k, 0.3 * k)
-        put.put([(md, direction)], {md: mean_depth(md, below[: 1 + (k - 1) % 4], ERRORS, 2.0, shared.count)})
+        put.put([(md, direction)], {md: mean_depth(md, below[: 1 + (k - 1) % 4], ERRORS, 2.0)})
     assert same(put.points, whole.points)
 
 

@@ -7,9 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.survey.path.leg_wander import LegWander, carry_memory
+from groundstation.survey.path.leg_wander import LegWander
+from groundstation.survey.well.kernels.position_errors import gather_path
 
 PLACES = 1201
+
+
+def gathered_by(wander: LegWander, legs: list[float]) -> np.ndarray:
+    """Variance that each leg adds (m^2)."""
+    memories, variances = np.empty((2, len(legs)))
+    gather_path(wander.moments(np.array(legs)), 0.0, wander.std, memories, variances)
+    return variances
 
 
 def moments_by_sums(legs: list[float], length: float) -> np.ndarray:
@@ -33,23 +41,15 @@ def moments_by_sums(legs: list[float], length: float) -> np.ndarray:
 @pytest.mark.parametrize("length", [0.5, 5.0, 40.0])
 @pytest.mark.parametrize("legs", [[2.0] * 4, [1.0, 3.0, 2.0], [6.0]])
 def test_what_a_path_gathers_is_what_sums_over_its_covariance_give(legs: list[float], length: float) -> None:
-    wander, memory, gathered = LegWander(1.0, length), 0.0, 0.0
-    covariance = moments_by_sums(legs, length)
-    for count, leg in enumerate(legs, 1):
-        moment = wander.moment(leg)
-        gathered += moment.variance + 2.0 * moment.with_start * memory
-        memory = carry_memory(memory, moment)
-        assert gathered == pytest.approx(float(covariance[:count, :count].sum()), rel=2e-3)
+    gathered, covariance = np.cumsum(gathered_by(LegWander(1.0, length), legs)), moments_by_sums(legs, length)
+    for count in range(1, len(legs) + 1):
+        assert gathered[count - 1] == pytest.approx(float(covariance[:count, :count].sum()), rel=2e-3)
 
 
 def test_a_short_leg_has_its_limit_and_a_long_hole_gathers_a_sixth_of_it() -> None:
     std, length, leg = 2e-3, 40.0, 0.5
-    wander, memory, gathered = LegWander(std, length), 0.0, []
-    assert wander.grown(0.0, wander.moment(leg)) == pytest.approx(std**2 * leg**5 / (60.0 * length), rel=0.01)
-    for _ in range(4000):
-        moment = wander.moment(leg)
-        gathered.append(wander.grown(memory, moment))
-        memory = carry_memory(memory, moment)
+    gathered = gathered_by(LegWander(std, length), [leg] * 4000)
+    assert gathered[0] == pytest.approx(std**2 * leg**5 / (60.0 * length), rel=0.01)
     assert gathered[-1] == pytest.approx(std**2 * leg**5 / (360.0 * length), rel=0.02)
 
 

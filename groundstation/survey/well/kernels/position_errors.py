@@ -90,6 +90,23 @@ def add_stations(
             mark += 1
 
 
+@kernel
+def gather_path(moments: Array, memory: float, std: float, memories: Array, variances: Array) -> None:
+    """Go on down a hole with what its path does between stations, see ``groundstation.survey.path.leg_wander``.
+
+    Parameters
+    ----------
+    moments : (n, 4), of every leg: v, b, a and what is kept of a curvature
+    memory : c of the first leg
+    std : rad/m, of the curvature
+    memories, variances : (n,), set: c of the leg below each, m^2 that each leg adds
+    """
+    for k in range(len(moments)):
+        variances[k] = std * std * max(moments[k, 0] + 2.0 * moments[k, 1] * memory, 0.0)
+        memory = moments[k, 3] * memory + moments[k, 2]
+        memories[k] = memory
+
+
 def warm_up() -> None:
     """Compile the loop or load it from the cache, so that the first survey does not wait for it."""
     starts, places = np.array([0, 0, 1]), np.zeros(1, np.intp)
@@ -99,3 +116,4 @@ def warm_up() -> None:
         np.zeros((3, 1)), np.zeros((3, 3)), 0, 1, np.empty((1, 3, 1)), np.empty((1, 3, 3)), np.empty((0, 3, 1)),
         np.empty((1, 3, 3)),
     )  # fmt: skip
+    gather_path(np.zeros((1, 4)), 0.0, 0.0, np.empty(1), np.empty(1))
