@@ -29,7 +29,8 @@ def arc_displacements(lengths: Array, upper: Array, lower: Array) -> Array:
 
     Where the two are opposite no arc is defined: such a leg leads nowhere, as the mean of its tangents does.
     """
-    bends = bend_angles(upper, lower)
+    chords = lower - upper
+    bends = 2.0 * np.arcsin(np.minimum(0.5 * np.sqrt((chords * chords).sum(axis=-1)), 1.0))
     bent = (bends > SMALL) & (bends < math.pi - OPPOSITE)
     safe = np.where(bent, bends, 1.0)
     factors = np.where(bent, 2.0 / safe * np.tan(0.5 * safe), 1.0 + np.where(bends < SMALL, bends * bends / 12.0, 0.0))

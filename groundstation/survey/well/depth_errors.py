@@ -65,30 +65,33 @@ def mean_depth(md: float, places: Sequence[Places], errors: DepthErrors, tube_le
     places : of the columns of each reading: scale, offset, and the length of each tube below its node from the bit up
     tube_length : m, as it is told
     """
-    counts = (*map(len, places),)
-    count, bit = len(places), md + tube_length * (sum(counts) / len(places) - OF_ALL)
-    parts = reading_parts(counts, max(places, key=len).tobytes())
-    values = errors.tube_std * parts.tubes + errors.offset_std * parts.offset + errors.scale_std * bit * parts.scale
+    counts, count = (*map(len, places),), len(places)
+    parts = reading_parts(counts, places[counts.index(max(counts))].tobytes())
+    values = errors.tube_std * parts.tubes
+    values[0, parts.scale] = errors.scale_std * (md + tube_length * parts.tubes_below)
+    values[0, parts.offset] = errors.offset_std
     return StationDepth(Packed.of(parts.places, values, parts.width), errors.reading_std**2 / count)
 
 
 class ReadingParts(NamedTuple):
-    """In which part of the readings of a station each error is: columns (1, c) at ascending places (c,)."""
+    """In which part of the readings of a station the length of each tube is, and where scale and offset stand."""
 
     width: int  # of the columns up to the last of them
-    places: Places
-    scale: Array
-    offset: Array
-    tubes: Array
+    places: Places  # (c,) ascending
+    scale: int  # place among these
+    offset: int
+    tubes: Array  # (1, c), zero for those two
+    tubes_below: float  # on the mean of the readings
 
 
 @lru_cache(maxsize=4096)
 def reading_parts(counts: tuple[int, ...], deepest: bytes) -> ReadingParts:
     """Parts for readings with so many places each; ``deepest`` are those of the reading that has most."""
     places = np.frombuffer(deepest, np.intp)
-    parts = np.zeros((3, len(places)))
-    parts[0, 0] = parts[1, 1] = 1.0
     # the length of a tube is in the readings of all that have it below them
-    parts[2, OF_ALL:] = (np.array(counts)[:, None] > np.arange(OF_ALL, len(places))).mean(axis=0)
+    parts = (np.array(counts)[:, None] > np.arange(len(places))).mean(axis=0)
+    parts[:OF_ALL] = 0.0
     order = np.argsort(places)
-    return ReadingParts(int(places.max()) + 1, places[order], *parts[:, None, order])
+    scale, offset = order.argsort()[:OF_ALL].tolist()
+    below = sum(counts) / len(counts) - OF_ALL
+    return ReadingParts(int(places.max()) + 1, places[order], scale, offset, parts[None, order], below)

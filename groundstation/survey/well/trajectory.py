@@ -39,7 +39,6 @@ from groundstation.survey.well.trajectory_rows import (
     Followed,
     TrajectorySums,
     across_of,
-    last_depths,
     runs_of,
 )
 
@@ -148,7 +147,8 @@ class Trajectory:
     def depth_covs(self) -> Array:
         """Covariances (n, 3, 3), m^2, that the own errors of depths make of ``covs``; what they share has columns."""
         rows = self._rows[: len(self)]
-        return np.asarray(rows["kinks"] + last_depths(rows))
+        along = rows["along"]
+        return np.asarray(rows["kinks"] + rows["depth_var"][:, None, None] * (along[:, :, None] * along[:, None]))
 
     @property
     def turned_back(self) -> list[float]:
@@ -302,17 +302,19 @@ class Trajectory:
         directions = [self._directions[place] for place in places]
         tangents = tangents_of(directions)
         jacobians = tangent_jacobians(tangents)
+        counts, own_vars = [], []
         for place, direction, jacobian in zip(places, directions, jacobians, strict=True):
-            columns = self._columns[place] = packed_of(direction)
+            columns, depth = packed_of(direction), self._depths[place]
+            self._columns[place] = columns
             self._down[place] = (jacobian @ columns.values)[2].copy()
+            width = max(columns.width, depth.columns.width)
+            counts.append((width, len(columns.places), len(depth.columns.places)))
+            own_vars.append(depth.own_var)
         rows, at = self._rows, np.array(places)
         rows["tangent"][at] = tangents
         rows["own"][at] = jacobians @ np.array([*map(COV, directions)]) @ jacobians.transpose(0, 2, 1)
-        for place in places:
-            row, columns, depth = rows[place], self._columns[place], self._depths[place]
-            row["width"] = max(columns.width, depth.columns.width)
-            row["count"], row["depths"] = len(columns.places), len(depth.columns.places)
-            row["depth_var"] = depth.own_var
+        rows["width"][at], rows["count"][at], rows["depths"][at] = np.array(counts).T
+        rows["depth_var"][at] = own_vars
 
     def _draw(self, first: int) -> None:
         """Compute the positions from a place on."""
@@ -325,9 +327,9 @@ class Trajectory:
         rows = self._rows[begin:end]
         legs = self._legs(rows)
         rows["position"] = np.add.accumulate(np.concatenate([rows["position"][:1], legs]))
-        self._go_along(rows, legs)
+        more = self._go_along(rows, legs)
         followed = self._follow(self._sums, begin, end - 1, with_columns=self._keeps_columns)
-        rows["cov"][1:] = followed.covs + (rows["path"] + rows["kinks"] + last_depths(rows))[1:]
+        rows["cov"][1:] = followed.covs + more
         self._sums = followed.sums
         self._marks += followed.marks
         if self._keeps_columns:
@@ -335,22 +337,21 @@ class Trajectory:
         else:
             self._kept += [UNKNOWN] * (len(rows) - 1)
 
-    def _go_along(self, rows: npt.NDArray[np.void], legs: Array) -> None:
-        """Compute what depths and the path between stations come to, from the first of some rows on."""
+    def _go_along(self, rows: npt.NDArray[np.void], legs: Array) -> Array:
+        """Compute what depths and the path between stations come to, from the first of some rows on: (n, 3, 3), m^2."""
         from groundstation.survey.well.kernels.position_errors import (
-            gather_path,  # reading alone needs no compiler
+            follow_legs,  # reading alone needs no compiler
         )
 
-        lengths = np.diff(rows["md"])
-        rows["along"][1:] = legs / lengths[:, None]
-        bent = rows["along"][:-1] - rows["along"][1:]
-        kinks = rows["depth_var"][:-1, None, None] * (bent[:, :, None] * bent[:, None])
-        memories, variances = np.empty((2, len(lengths)))
-        gather_path(self._wander.moments(lengths), rows["memory"].item(0), self._wander.std, memories, variances)
-        rows["memory"][1:] = memories
-        left = variances[:, None, None] * across_of(rows["along"][1:])
-        for name, steps in (("kinks", kinks), ("path", left)):
-            rows[name] = np.add.accumulate(np.concatenate([rows[name][:1], steps]))
+        lengths, more = np.diff(rows["md"]), np.empty((len(legs), 3, 3))
+        alongs, memories = rows["along"].copy(), rows["memory"].copy()
+        kinks, path = rows["kinks"].copy(), rows["path"].copy()
+        follow_legs(
+            legs, lengths, rows["depth_var"].copy(), self._wander.moments(lengths), self._wander.std, alongs, memories,
+            kinks, path, more,
+        )  # fmt: skip
+        rows["along"], rows["memory"], rows["kinks"], rows["path"] = alongs, memories, kinks, path
+        return more
 
     def _follow(self, sums: TrajectorySums, begin: int, end: int, *, with_columns: bool) -> Followed:
         """Continue ``sums`` from one place to another."""
@@ -385,7 +386,7 @@ class Trajectory:
         shared, covs = np.empty((count if with_columns else 0, 3, width)), np.empty((count, 3, 3))
         add_stations(
             weights, ends, starts, places, lean, down, rows["own"].copy(), rows["along"][:-1] - alongs, alongs,
-            depth_starts, depth_places, by_depth, widths, passed, own,
+            depth_starts, depth_places, by_depth, widths, passed, np.empty_like(passed), own,
             int(marked[0]) if len(marked) else count, BLOCK, marks, own_marks, shared, covs,
         )  # fmt: skip
         return Followed(

@@ -54,12 +54,6 @@ class Followed:
     covs: Array  # (n, 3, 3)
 
 
-def last_depths(rows: npt.NDArray[np.void]) -> Array:
-    """Covariance (n, 3, 3), m^2, that the own error of each row's depth makes of its position."""
-    along = rows["along"]
-    return np.asarray(rows["depth_var"][:, None, None] * (along[:, :, None] * along[:, None]))
-
-
 def across_of(along: Array) -> Array:
     """Projections (..., 3, 3) on the planes across vectors (..., 3); on all of space of one that is zero."""
     sizes = (along * along).sum(axis=-1)[..., None, None]

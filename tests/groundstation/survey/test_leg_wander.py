@@ -8,16 +8,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.survey.path.leg_wander import LegWander
-from groundstation.survey.well.kernels.position_errors import gather_path
+from groundstation.survey.well.kernels.position_errors import follow_legs
 
 PLACES = 1201
 
 
 def gathered_by(wander: LegWander, legs: list[float]) -> np.ndarray:
     """Variance that each leg adds (m^2)."""
-    memories, variances = np.empty((2, len(legs)))
-    gather_path(wander.moments(np.array(legs)), 0.0, wander.std, memories, variances)
-    return variances
+    count, lengths = len(legs), np.array(legs)
+    down = np.column_stack([0.0 * lengths, 0.0 * lengths, lengths])
+    path = np.zeros((count + 1, 3, 3))
+    follow_legs(
+        down, lengths, np.zeros(count + 1), wander.moments(lengths), wander.std, np.zeros((count + 1, 3)),
+        np.zeros(count + 1), np.zeros((count + 1, 3, 3)), path, np.empty((count, 3, 3)),
+    )  # fmt: skip
+    assert not path[:, 2, 2].any()
+    return np.diff(path[:, 0, 0])
 
 
 def moments_by_sums(legs: list[float], length: float) -> np.ndarray:
