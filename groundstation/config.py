@@ -39,8 +39,6 @@ class GroundConfig(BaseModel):
     depth_scale_std: NotNegative = Field(5.6e-4, description="m/m, of the depth of the bit")
     depth_offset_std: NotNegative = Field(0.01, description="m, of the stick-up")
     depth_reading_std: NotNegative = Field(2e-3, description="m, of each reading of the depth")
-    curvature_std_deg_per_m: NotNegative = Field(0.15, description="by which the path between stations wanders")
-    curvature_length: Positive = Field(10.0, description="m, over which a curvature of the path is forgotten")
     gravity: Positive = Field(9.81, description="m/s^2, of the site")
     accelerometer_bias_std_deg: float = Field(
         SENSOR_BIAS_DEG, ge=0.0, description="as a tilt; 0.002 where every sensor is calibrated"
@@ -54,7 +52,13 @@ class GroundConfig(BaseModel):
     )
     collar_azimuth_deg: float = 0.0
     collar_std_deg: float = Field(0.0, ge=0.0, description="of the direction at the collar, each way")
-    weighting: Weighting = Field(Weighting.BAYES, description="how the readings of one station count")
+    weighting: Weighting = Field(
+        Weighting.BAYES, description="how the readings of one station count, or all of the hole in one adjustment"
+    )
+    mount_tilt_std_deg: float = Field(0.5, ge=0.0, description="of an IMU against its tube's axis; aligned, 0.01")
+    play_std_deg: Positive = Field(0.01, description="of a tube against the hole at a stop, until the looks tell it")
+    curvature_std_deg_per_m: Positive = Field(0.3, description="of the hole's curvature, before the looks")
+    curvature_length: Positive = Field(20.0, description="m, over which a curvature is forgotten")
     target: Positive = Field(30.0, description="m, length of the design axis")
     design_inclination_deg: float = Field(0.0, ge=0.0, le=180.0)
     design_azimuth_deg: float = 0.0

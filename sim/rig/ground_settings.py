@@ -18,6 +18,7 @@ def ground_settings(world: World) -> dict[str, Any]:
             "gravity": file.accelerometer.gravity_mps2,
             "accelerometer_bias_std_deg": file.accelerometer.bias_std_deg,
             "mount_std_deg": file.joints.mount_std_deg,
+            "mount_tilt_std_deg": file.joints.mount_tilt_std_deg,
             "target": file.design.length_m or world.scenario.tubes * world.scenario.tube_length,
             "design_inclination_deg": file.design.inclination_deg,
             "design_azimuth_deg": file.design.azimuth_deg,

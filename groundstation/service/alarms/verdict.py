@@ -38,6 +38,7 @@ class VerdictDoubt(enum.StrEnum):
     CLOCK = "clock"
     YAW = "yaw"
     UNCERTAIN = "uncertain"
+    CONTRADICTION = "contradiction"
 
 
 @dataclass(frozen=True, slots=True)

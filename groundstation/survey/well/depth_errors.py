@@ -70,7 +70,7 @@ def mean_depth(md: float, places: Sequence[Places], errors: DepthErrors, tube_le
     values = errors.tube_std * parts.tubes
     values[0, parts.scale] = errors.scale_std * (md + tube_length * parts.tubes_below)
     values[0, parts.offset] = errors.offset_std
-    return StationDepth(Packed.of(parts.places, values, parts.width), errors.reading_std**2 / count)
+    return StationDepth(Packed.of_values(values, parts.places, parts.width), errors.reading_std**2 / count)
 
 
 class ReadingParts(NamedTuple):

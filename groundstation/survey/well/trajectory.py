@@ -26,7 +26,8 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.fusion.resolve import Direction, direction_angles
-from groundstation.survey.fusion.shared import Packed, add_shared_errors, packed_of
+from groundstation.survey.fusion.shared import Packed, add_shared_errors
+from groundstation.survey.fusion.sphere_direction import tangent_errors
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
 from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.well.arcs import arc_displacements, bend_angles, on_arc
@@ -44,7 +45,7 @@ from groundstation.survey.well.trajectory_rows import (
 
 Array = npt.NDArray[np.float64]
 BLOCK = 64  # stations from mark to mark
-COV, PLACES, VALUES = map(attrgetter, ("cov", "places", "values"))
+PLACES, VALUES = map(attrgetter, ("places", "values"))
 DEPTH_PLACES, DEPTH_VALUES = map(attrgetter, ("columns.places", "columns.values"))
 NONE: Final = Packed(np.zeros((2, 0)))
 UNKNOWN: Final = np.zeros((3, 0))
@@ -274,7 +275,7 @@ class Trajectory:
         """Shared columns (3, s) of the tangent at a station."""
         packed = self._columns[place]
         values = np.concatenate([packed.values, self._down[place][None]])
-        return Packed.of(packed.places, values, packed.width).columns()
+        return Packed.of_values(values, packed.places, packed.width).columns()
 
     def columns(self) -> Iterator[Array]:
         """Shared columns (n, 3, s) of the points from the collar down, some at a time, as many as were known there."""
@@ -303,16 +304,14 @@ class Trajectory:
         tangents = tangents_of(directions)
         jacobians = tangent_jacobians(tangents)
         counts, own_vars = [], []
+        rows, at = self._rows, np.array(places)
         for place, direction, jacobian in zip(places, directions, jacobians, strict=True):
-            columns, depth = packed_of(direction), self._depths[place]
-            self._columns[place] = columns
-            self._down[place] = (jacobian @ columns.values)[2].copy()
+            own, columns, self._down[place] = tangent_errors(direction, jacobian)
+            rows["own"][place], self._columns[place], depth = own, columns, self._depths[place]
             width = max(columns.width, depth.columns.width)
             counts.append((width, len(columns.places), len(depth.columns.places)))
             own_vars.append(depth.own_var)
-        rows, at = self._rows, np.array(places)
         rows["tangent"][at] = tangents
-        rows["own"][at] = jacobians @ np.array([*map(COV, directions)]) @ jacobians.transpose(0, 2, 1)
         rows["width"][at], rows["count"][at], rows["depths"][at] = np.array(counts).T
         rows["depth_var"][at] = own_vars
 
