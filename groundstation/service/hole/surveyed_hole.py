@@ -29,7 +29,7 @@ from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
 from groundstation.survey.fusion.survey_trust import Trust
 from groundstation.survey.fusion.transport import Carried, carry_directions
 from groundstation.survey.wall.column_deviation import Deviation, Deviations, axis_deviations, project_to_target
-from groundstation.survey.well.depth_errors import StationDepth, mean_depth
+from groundstation.survey.well.depth_errors import mean_depth
 from groundstation.survey.well.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
@@ -243,7 +243,11 @@ class SurveyedHole:
         return changed
 
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
-        self._trajectory.put(self._directions(changed), self._depths(changed))
+        depths, places_of = {}, self._stops.depth_places.__getitem__
+        for one in changed:
+            places = [*map(places_of, one.stops.rows)]
+            depths[one.md] = mean_depth(one.md, places, self._depth_errors, self._config.tube_length)
+        self._trajectory.put(self._directions(changed), depths)
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)
         if worst is None:
@@ -267,14 +271,6 @@ class SurveyedHole:
         places = self._shared.transport_places(len(measured) + 1)
         self._carried = dict(zip(mds, carry_directions(self._config.collar, directions, places), strict=True))
         return [(md, carried.direction) for md, carried in self._carried.items()]
-
-    def _depths(self, stations: Sequence[SurveyStation]) -> dict[float, StationDepth]:
-        """Errors of the depths of stations, by these (m)."""
-        found, places_of = {}, self._stops.depth_places.__getitem__
-        for station in stations:
-            places = [*map(places_of, station.stops.rows)]
-            found[station.md] = mean_depth(station.md, places, self._depth_errors, self._config.tube_length)
-        return found
 
     def _deviate(self) -> Deviations:
         """Deviations of the trajectory as it is drawn."""

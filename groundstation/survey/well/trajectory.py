@@ -300,7 +300,7 @@ class Trajectory:
         """Compute the rows at some places that depend on their own direction alone."""
         if not places:
             return
-        directions = [self._directions[place] for place in places]
+        directions = [*map(self._directions.__getitem__, places)]
         tangents = tangents_of(directions)
         jacobians = tangent_jacobians(tangents)
         counts, own_vars = [], []
@@ -393,7 +393,9 @@ class Trajectory:
             [
                 TrajectorySums(own_marks[number].copy(), marks[number, :, : int(widths[k])].copy(), float(legs[k]))
                 for number, k in enumerate(marked.tolist())
-            ],
+            ]
+            if len(marked)
+            else [],
             runs_of(shared, widths) if with_columns else [],
             covs,
         )
