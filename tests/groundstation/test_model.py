@@ -355,7 +355,9 @@ def test_the_view_says_which_angle_dominates(tmp_path: Path) -> None:
 
 
 def test_a_column_along_its_inclined_design_does_not_deviate(tmp_path: Path) -> None:
-    _, view = column_of(tmp_path, 10.0, 70.0, design_inclination_deg=10.0, design_azimuth_deg=70.0)
+    design = {"design_inclination_deg": 10.0, "design_azimuth_deg": 70.0}
+    collar = {"collar_inclination_deg": 10.0, "collar_azimuth_deg": 70.0}
+    _, view = column_of(tmp_path, 10.0, 70.0, **design, **collar)
     for row in (*view["stations"], view["projection"]):
         assert row["deviation_cm"] == pytest.approx(0.0, abs=1e-9)
 

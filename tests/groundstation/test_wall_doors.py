@@ -153,12 +153,17 @@ def test_own_covariances_are_used(tmp_path: Path) -> None:
     assert peaks[0] < peaks[1] < peaks[2]
 
 
+def raked(inclination_deg: float) -> dict[str, float]:
+    """A design that leans, and a crew that told the collar to be set out so."""
+    return {"design_inclination_deg": inclination_deg, "collar_inclination_deg": inclination_deg}
+
+
 @pytest.mark.parametrize("rake_deg", [0.0, 15.0, 60.0])
 def test_a_hole_drilled_on_its_design_stands_on_it_in_the_wall(tmp_path: Path, rake_deg: float) -> None:
     case = Case(LINE, "H2", inclination_deg=rake_deg)
     others = {name: surveyed(case, name, 0.0) for name in ("H1", "H3")}
     file = written(tmp_path, case, others, with_covs=True)
-    rig = Rig(tmp_path / "ground", target=LENGTH, wall=file, hole="H2", design_inclination_deg=rake_deg)
+    rig = Rig(tmp_path / "ground", target=LENGTH, wall=file, hole="H2", **raked(rake_deg))
     rig.run(5.0)
     for stop in range(1, 5):
         rig.drill(stop, rake_deg)
