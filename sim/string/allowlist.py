@@ -105,6 +105,7 @@ UNUSED: Final[dict[str, str]] = {  # keys without effect on a campaign, and why
     "design.length_m": GROUND,
     "design.radius_m": GROUND,
     "design.tolerance": GROUND,
+    "design.leg": GROUND,
     "site": "its hole is chosen before",
     "site.name": "its hole is chosen before",
     "site.radius_m": GROUND,

@@ -100,7 +100,7 @@ class WayAhead:
 
     md: float  # m, of the station
     rest: float  # m, from there to the plane
-    offset: Array  # (3,) m, of the station from the head
+    offset: Array  # (3,) m, of the station from the end of the design
     tangent: Array  # (3,)
     onto_plane: Array  # (2, 3): an error in space, as it is seen on planes across the design axis
     path: PathAhead
@@ -108,12 +108,12 @@ class WayAhead:
 
     def foreseen(self, part: float) -> NormalMixture:
         """Mixture on the plane at a part of the way."""
-        straight = self.design.across @ (self.offset + part * self.rest * self.tangent)
+        straight = self.design.end.across @ (self.offset + part * self.rest * self.tangent)
         return self.path.offsets(part * self.rest).through(self.onto_plane @ self.path.tendency.axes.T, straight)
 
     def deviation(self, part: float, mixture: NormalMixture) -> Deviation:
         """Mean and covariance of that mixture as a deviation."""
-        along = self.design.length - (1.0 - part) * (self.design.length - float(self.offset @ self.design.axis))
+        along = self.design.length + (1.0 - part) * float(self.offset @ self.design.end.tangent)
         md = self.md + part * self.rest
         return Deviation(md, along, mixture.mean, mixture.cov, self.design.tolerance.at(along))
 
@@ -138,15 +138,16 @@ def project_to_target(
     tendency : what the hole's directions say of its curvature, at that station
     design : axis, length and tolerance
     """
-    offset, axis = point.position - np.array(design.head), design.axis
+    end = design.end
+    offset, axis = point.position - end.point, end.tangent
     along = float(point.tangent @ axis)
-    rest = (design.length - float(offset @ axis)) / along if along >= STEEPEST else -1.0
+    rest = -float(offset @ axis) / along if along >= STEEPEST else -1.0
     if rest <= 0.0:
         here = point_deviation(point, design)
         now = NormalMixture(np.ones(1), here.offset[None], here.cov[None])
         return ProjectedEnd(here, now, here.cov, is_reached=along >= STEEPEST, comes_there=along >= STEEPEST)
     # an error along the axis changes how far there is to go: what counts is its trace on the target's plane
-    onto_plane = design.across @ (np.eye(3) - np.outer(point.tangent, axis) / along)
+    onto_plane = end.across @ (np.eye(3) - np.outer(point.tangent, axis) / along)
     across = tendency.axes @ tangent_jacobians(point.tangent[None])[0]
     shared = across @ (direction.total_cov - direction.cov) @ across.T
     path = PathAhead(tendency, tendency.axes @ point.cov @ tendency.axes.T, shared)
