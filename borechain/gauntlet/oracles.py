@@ -237,7 +237,7 @@ def _missing(rows: list[dict[str, Any]], rig: GauntletRig, standing: set[str]) -
 
 def _rests(world: FaultyWorld) -> list[tuple[int, float]]:
     """Tube and its depth (m) in every rest of the schedule; a string rests too while a tube is added."""
-    return _nodes([(phase.tube, world.true_depth(phase.start)) for phase in world.phases if phase.kind != "drill"])
+    return _nodes([(phase.tube, world.bit_depth(phase.start)) for phase in world.phases if phase.kind != "drill"])
 
 
 def _expected(rig: GauntletRig) -> list[tuple[int, float]]:
@@ -247,7 +247,7 @@ def _expected(rig: GauntletRig) -> list[tuple[int, float]]:
     has stood: it counts what it has heard, and tells the crew later. A survey taken after the newest reading of the
     depth is placed by the next.
     """
-    stops = [(phase.tube, rig.world.true_depth(phase.end)) for phase in rig.world.phases if phase.kind == "stop"]
+    stops = [(phase.tube, rig.world.bit_depth(phase.end)) for phase in rig.world.phases if phase.kind == "stop"]
     ground = rig.inline.ground
     string, waiting = ground.model.string, ground.model.placement.waiting
     due, epoch = ground.config.survey_after + LATE, string.time.epoch
@@ -255,7 +255,7 @@ def _expected(rig: GauntletRig) -> list[tuple[int, float]]:
     owed = _nodes([stop for stop in stops if not any(abs(stop[1] - md) <= DEPTH_TOLERANCE for md in waits)])
     heard = max((stand.ended_at for stand in string.depths.stands if stand.epoch == epoch), default=math.inf)
     late = {one.message.tube for one in waiting if one.message.station_at > heard}
-    coming = [one for one in _nodes([(max(late, default=0), rig.world.true_depth(rig.world.end))]) if one[0] in late]
+    coming = [one for one in _nodes([(max(late, default=0), rig.world.bit_depth(rig.world.end))]) if one[0] in late]
     return [one for one in owed if not _is_among(one, coming)]
 
 

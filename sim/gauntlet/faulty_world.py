@@ -127,12 +127,12 @@ class FaultyWorld(World):
         self.spoiled = True
         return self.spoilers[tube](reading)
 
-    def bit_depth(self, t: float) -> float:
+    def measured_depth(self, t: float) -> float:
         """Depth of the bit as the rig measures it, m."""
-        return max(self.true_depth(t) + self.depth_error, 0.0)
+        return max(super().measured_depth(t) + self.depth_error, 0.0)
 
-    def true_depth(self, t: float) -> float:
-        """Depth of the bit, m."""
+    def bit_depth(self, t: float) -> float:
+        """Depth of the bit along the hole, m."""
         if t not in self._depths:
             self._depths[t] = super().bit_depth(t)
         return self._depths[t]

@@ -77,8 +77,21 @@ class World(DrillString):
         return count, edge_at, rising, torque, earlier
 
     def bit_depth(self, t: float) -> float:
-        """Measured depth of the bit, m."""
+        """Depth of the bit along the hole, m."""
         return float(self.motion.depth(np.array([t]))[0][0])
+
+    def measured_depth(self, t: float) -> float:
+        """Depth of the bit as the rig measures it, m."""
+        told = self.scenario.file.told
+        depth = self.bit_depth(t)
+        if told.depth_stuck_after_s is not None:
+            depth -= self._missed_depth(t, self.begin + told.depth_stuck_after_s, told.depth_stuck_s)
+        return depth * (1.0 + told.depth_scale)
+
+    def _missed_depth(self, t: float, at: float, lasts: float | None) -> float:
+        """Depth (m) that a meter has missed which stood still from ``at`` (s, rig time) on, for a time (s) or ever."""
+        until = t if lasts is None else min(t, at + lasts)
+        return self.bit_depth(until) - self.bit_depth(at) if until > at else 0.0
 
     def local_clock(self, address: int, t: float) -> float:
         """What the clock of a process shows at rig time ``t`` (s)."""
