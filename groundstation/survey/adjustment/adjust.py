@@ -1,0 +1,153 @@
+"""One adjustment of the whole hole: every look at every station, by least squares on the sphere.
+
+The unknowns are the direction and the curvature of the hole at collar and stations, and for each tube the bias of its
+accelerometer, the tilt of its mount and the turn of its chain; gravity, and what blunders were found. All have priors.
+How far a tube lies askew in the hole at each stop (play and bend) is learnt from what the looks leave.
+Source: Gauss-Newton; variance components after Foerstner, "Ein Verfahren zur Schaetzung von Varianz- und
+Kovarianzkomponenten", AVN 86 (1979).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.adjustment.adjusted import Adjusted, Linearised, LinearSolution
+from groundstation.survey.adjustment.equations import (
+    Equations,
+    path_equations,
+    string_departure,
+    string_information,
+)
+from groundstation.survey.adjustment.kernels.observations import add_looks, linearise_looks
+from groundstation.survey.adjustment.kernels.path_elimination import eliminate_path, substitute_path
+from groundstation.survey.adjustment.looks import OF_TUBE, FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
+from groundstation.survey.adjustment.play import PLAY_KNOWN_AS, learnt_play
+from groundstation.survey.adjustment.sphere import carried_bases, step_directions
+from groundstation.survey.adjustment.starting_point import first_start
+
+Array = npt.NDArray[np.float64]
+ITERATIONS = 12
+SETTLED = 1e-3  # standard deviations, of the last step
+PLAY_SETTLED = 0.02  # of its variance
+GROSS = 16.27  # chi-square of three beyond which a look counts less: one in a thousand
+
+
+def adjust_hole(
+    looks: Looks,
+    string: StringPrior,
+    path: PathPrior,
+    extra: FurtherEffects | None = None,
+    start: StartingPoint | None = None,
+) -> Adjusted:
+    """Adjust a hole.
+
+    Parameters
+    ----------
+    looks : at its stations
+    string, path : what was known before
+    extra : further effects, such as blunders that were found
+    start : where to begin; by default from the looks alone
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When the equations have no solution, as where a prior is not a covariance.
+    """
+    extra = extra or FurtherEffects(np.zeros((len(looks), 3, 0)), np.zeros(0))
+    now = start or first_start(looks, string, path)
+    if len(now.extra) != len(extra.std):
+        now = replace(now, extra=np.zeros(len(extra.std)))
+    known = string_information(string, extra)
+    for _ in range(ITERATIONS):
+        bases = carried_bases(now.tangents)
+        linear = linearise_all(looks, now, bases, extra)
+        solution = solve_equations(
+            looks, linear, path_equations(path, now, bases), known, string_departure(string, now), extra
+        )
+        now = _stepped(now, bases, solution)
+        found = Adjusted(looks, string, path, extra, now, linear, solution, known)
+        play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)
+        if solution.step < SETTLED and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var:
+            break
+        now = replace(now, play_var=play)
+    return found
+
+
+def linearise_all(looks: Looks, now: StartingPoint, bases: Array, extra: FurtherEffects) -> Linearised:
+    """Linearise all looks where the unknowns stand; a look that is far off counts less."""
+    count = len(looks)
+    jacobians, weights = np.empty((count, 3, 9)), np.empty((count, 3, 3))
+    residuals, yaw_errors = np.empty((count, 3)), np.empty(count)
+    linearise_looks(
+        looks.station, looks.tube, looks.force, looks.force_var, looks.yaw, looks.yaw_var, now.tangents, bases,
+        now.tubes, now.gravity, now.play_var, jacobians, weights, residuals, yaw_errors,
+    )  # fmt: skip
+    if len(now.extra):
+        residuals -= extra.columns @ now.extra
+    squares = np.einsum("ka,kab,kb->k", residuals, weights, residuals)
+    weights *= np.sqrt(GROSS / np.maximum(squares, GROSS))[:, None, None]
+    return Linearised(bases, jacobians, weights, residuals, squares)
+
+
+def solve_equations(
+    looks: Looks,
+    linear: Linearised,
+    of_path: tuple[Array, Array, Array],
+    known: Array,
+    departure: Array,
+    extra: FurtherEffects,
+) -> LinearSolution:
+    """Solve the normal equations of linearised looks."""
+    equations = gather_equations(looks, linear, of_path, known, departure, extra)
+    diagonal, tied, coupled, in_common = equations.diagonal, equations.tied, equations.coupled, equations.in_common
+    eliminate_path(diagonal, tied, coupled)
+    wide = coupled.reshape(-1, coupled.shape[2])
+    in_common -= wide.T @ wide
+    size = len(known)
+    cov = np.asarray(np.linalg.inv(in_common[:size, :size]), np.float64)
+    common = cov @ in_common[:size, size]
+    states = (coupled[:, :, size] - coupled[:, :, :size] @ common)[:, :, None].copy()
+    substitute_path(diagonal, tied, states)
+    return LinearSolution(diagonal, tied, coupled[:, :, :size], cov, common, states[:, :, 0])
+
+
+def gather_equations(
+    looks: Looks,
+    linear: Linearised,
+    of_path: tuple[Array, Array, Array],
+    known: Array,
+    departure: Array,
+    extra: FurtherEffects,
+) -> Equations:
+    """Normal equations of looks and priors."""
+    diagonal, tied, right = of_path
+    size, count = len(known), len(diagonal)
+    coupled, in_common = np.zeros((count, 4, size + 1)), np.zeros((size + 1, size + 1))
+    in_common[:size, :size] = known
+    in_common[:size, size] = -known @ departure
+    at_station, by_direction = np.zeros((count, 2, 2)), np.zeros((count, 2, size + 1))
+    gravity_at = size - 1 - len(extra.std)
+    add_looks(
+        looks.station, looks.tube, linear.jacobians, linear.weights, linear.residuals, extra.columns, gravity_at,
+        at_station, by_direction, in_common,
+    )  # fmt: skip
+    diagonal[:, :2, :2] += at_station
+    coupled[:, :2] = by_direction
+    coupled[:, :, size] += right
+    return Equations(diagonal, tied, coupled, in_common)
+
+
+def _stepped(now: StartingPoint, bases: Array, solution: LinearSolution) -> StartingPoint:
+    """Where the unknowns stand after a step."""
+    tubes = now.tubes + solution.common[: now.tubes.size].reshape(-1, OF_TUBE)
+    return StartingPoint(
+        step_directions(now.tangents, bases, solution.states[:, :2]),
+        now.curvatures + solution.states[:, 2:],
+        tubes,
+        now.gravity + float(solution.common[now.tubes.size]),
+        now.play_var,
+        now.extra + solution.common[now.tubes.size + 1 :],
+    )

@@ -1,0 +1,150 @@
+"""What an adjustment came to: directions with their covariance, tubes, and what the looks leave."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.adjustment.kernels.path_elimination import path_covariances, reduce_right, substitute_path
+from groundstation.survey.adjustment.looks import OF_TUBE, FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Linearised:
+    """Looks where the unknowns stood: see ``linearise_looks``; ``squares`` (n,) of their residuals before."""
+
+    bases: Array
+    jacobians: Array
+    weights: Array
+    residuals: Array
+    squares: Array
+
+
+@dataclass(frozen=True, slots=True)
+class LinearSolution:
+    """The factorised chain, the covariance (p, p) of what stations have in common, and the step."""
+
+    diagonal: Array
+    tied: Array
+    coupled: Array  # (s + 1, 4, p)
+    cov: Array
+    common: Array  # (p,)
+    states: Array  # (s + 1, 4)
+
+    @property
+    def step(self) -> float:
+        """Largest step of an unknown in its standard deviations, at most as the equations know them."""
+        of_common = np.max(np.abs(self.common) / np.sqrt(np.diag(self.cov)), initial=0.0)
+        rigid = np.einsum("kab,kab->ka", self.diagonal, self.diagonal)  # of what is left of each block
+        return float(max(of_common, np.max(np.abs(self.states) * np.sqrt(rigid))))
+
+
+@dataclass(frozen=True)  # with a dictionary, for what is worked out once
+class Adjusted:
+    """A hole that was adjusted.
+
+    Parameters
+    ----------
+    looks, string, path, extra : what it was made of
+    now : where the unknowns stand; it is where the next adjustment begins
+    linear, solution : the last linear equations
+    known : (p, p), information on what stations have in common before any look
+    """
+
+    looks: Looks
+    string: StringPrior
+    path: PathPrior
+    extra: FurtherEffects
+    now: StartingPoint
+    linear: Linearised
+    solution: LinearSolution
+    known: Array
+
+    @property
+    def common_cov(self) -> Array:
+        """Covariance (p, p) of what stations have in common."""
+        return self.solution.cov
+
+    @cached_property
+    def by_common(self) -> Array:
+        """Change of every state (s + 1, 4, p) for one unit of what stations have in common."""
+        right = -self.solution.coupled
+        substitute_path(self.solution.diagonal, self.solution.tied, right)
+        return right
+
+    @cached_property
+    def own_covs(self) -> Array:
+        """Covariances (s + 1, 4, 4) of the states were all that stations have in common known."""
+        covs = np.empty_like(self.solution.diagonal)
+        path_covariances(self.solution.diagonal, self.solution.tied, covs)
+        return covs
+
+    @cached_property
+    def columns(self) -> Array:
+        """Change of every state (s + 1, 4, p) for one standard deviation of independent errors in common."""
+        return np.asarray(self.by_common @ np.linalg.cholesky(self.common_cov))
+
+    @cached_property
+    def covs(self) -> Array:
+        """Covariances (s + 1, 4, 4) of direction and curvature at collar and stations."""
+        return np.asarray(self.own_covs + self.columns @ np.swapaxes(self.columns, 1, 2))
+
+    @cached_property
+    def left(self) -> Array:
+        """What the looks leave (n, 3), m/s^2: read less adjusted."""
+        stepped = np.einsum("kab,kb->ka", self.linear.jacobians, self._step_of_looks)
+        return np.asarray(self.linear.residuals - stepped - self.extra.columns @ self._extra_step)
+
+    @property
+    def _extra_step(self) -> Array:
+        return self.solution.common[OF_TUBE * self.string.count + 1 :]
+
+    @property
+    def _step_of_looks(self) -> Array:
+        """Last step of the nine unknowns of every look (n, 9)."""
+        size = OF_TUBE * self.string.count
+        tubes = self.solution.common[:size].reshape(-1, OF_TUBE)
+        gravity = np.full((len(self.looks), 1), self.solution.common[size])
+        return np.concatenate([self.solution.states[self.looks.station, :2], tubes[self.looks.tube], gravity], axis=1)
+
+    def cofactor(self, directions: Array, common: Array) -> tuple[Array, Array]:
+        """Covariance of all unknowns times columns: of directions (s + 1, 2, r) and of what is in common (p, r).
+
+        Returns the same shapes, the former as states (s + 1, 4, r).
+        """
+        right = np.zeros((*self.solution.diagonal.shape[:2], directions.shape[2]))
+        right[:, :2] = directions
+        reduce_right(self.solution.diagonal, self.solution.tied, right)
+        of_path = np.einsum("jap,jar->pr", self.solution.coupled, right)
+        substitute_path(self.solution.diagonal, self.solution.tied, right)
+        found = self.common_cov @ (common - of_path)
+        return right + self.by_common @ found, found
+
+    @cached_property
+    def redundancies(self) -> Array:
+        """Part P_k (n, 3, 3) of the inverse covariance of every look that is free to contradict: W - W J Q J^T W."""
+        from groundstation.survey.adjustment.kernels.free_parts import free_parts
+
+        found = np.empty((len(self.looks), 3, 3))
+        direction = self.by_common[:, :2]
+        free_parts(
+            self.looks.station, self.looks.tube, self.linear.jacobians, self.linear.weights, self.extra.columns,
+            OF_TUBE * self.string.count, self.covs[:, :2, :2].copy(),
+            (direction @ self.common_cov), self.common_cov, found,
+        )  # fmt: skip
+        return found
+
+    @property
+    def squares(self) -> float:
+        """Weighted sum of squares of what the looks leave."""
+        return float(np.einsum("ka,kab,kb->", self.left, self.linear.weights, self.left))
+
+    @property
+    def redundancy(self) -> float:
+        """What that sum is to be."""
+        return float(np.einsum("kab,kba->", self.redundancies, np.linalg.inv(self.linear.weights)))

@@ -1,0 +1,100 @@
+"""The normal equations of a hole, without its looks: what is known of tubes, collar and path before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.adjustment.looks import (
+    BIAS,
+    OF_TUBE,
+    TILT,
+    TURN,
+    FurtherEffects,
+    PathPrior,
+    StartingPoint,
+    StringPrior,
+)
+from groundstation.survey.adjustment.sphere import bends_between
+from groundstation.survey.path.curvature_process import process_step
+
+Array = npt.NDArray[np.float64]
+STATE = 4  # unknowns of a station: direction and curvature, each across two axes
+KNOWN = 1e-16  # rad^2, least variance of what is given as known
+
+
+@dataclass(frozen=True, slots=True)
+class Equations:
+    """Normal equations: (s + 1, 4, 4) blocks of the path and between stations, (s + 1, 4, p + 1) and (p + 1, p + 1).
+
+    The last column of ``coupled`` and ``in_common`` is the right side.
+    """
+
+    diagonal: Array
+    tied: Array
+    coupled: Array
+    in_common: Array
+
+
+def path_equations(path: PathPrior, start: StartingPoint, bases: Array) -> tuple[Array, Array, Array]:
+    """Blocks (s + 1, 4, 4), ties to the station above (s + 1, 4, 4) and right sides (s + 1, 4) of the path alone."""
+    count = len(path.md)
+    diagonal, tied, right = np.zeros((count, STATE, STATE)), np.zeros((count, STATE, STATE)), np.zeros((count, STATE))
+    collar = np.linalg.inv(bases[0] @ path.collar_cov @ bases[0].T + KNOWN * np.eye(2))
+    off = bends_between(np.stack([start.tangents[0], path.collar]), bases[:1].repeat(2, axis=0))[0]
+    diagonal[0, :2, :2] += collar
+    right[0, :2] += collar @ off
+    rigid = path.curvature_std**-2
+    diagonal[0, 2:, 2:] += rigid * np.eye(2)
+    right[0, 2:] -= rigid * start.curvatures[0]
+    if count > 1:
+        steps = [process_step(length, path.correlation_length) for length in np.diff(path.md).tolist()]
+        go = np.array([step[0][1:, 1:] for step in steps])
+        weight = np.linalg.inv(path.curvature_std**2 * np.array([step[1][1:, 1:] for step in steps]))
+        go, weight = _for_both_axes(go), _for_both_axes(np.asarray(weight, np.float64))
+        bent = np.concatenate([bends_between(start.tangents, bases), np.diff(start.curvatures, axis=0)], axis=1)
+        lever = go - np.eye(STATE)
+        before = np.concatenate([np.zeros((count - 1, 2)), start.curvatures[:-1]], axis=1)
+        pull = np.einsum("kab,kb->ka", weight, bent - np.einsum("kab,kb->ka", lever, before))
+        back = np.swapaxes(go, 1, 2)
+        diagonal[1:] += weight
+        diagonal[:-1] += back @ weight @ go
+        tied[1:] = -weight @ go
+        right[1:] -= pull
+        right[:-1] += np.einsum("kab,kb->ka", back, pull)
+    return diagonal, tied, right
+
+
+def _for_both_axes(matrices: Array) -> Array:
+    """Matrices (k, 2, 2) of direction and curvature of one axis as (k, 4, 4) of both axes."""
+    found = np.zeros((len(matrices), 2, 2, 2, 2))
+    found[:, :, 0, :, 0] = found[:, :, 1, :, 1] = matrices
+    return found.reshape(-1, STATE, STATE)
+
+
+def string_information(string: StringPrior, extra: FurtherEffects) -> Array:
+    """Information (p, p) on tubes, gravity and further effects before any look."""
+    count = string.count
+    width = OF_TUBE * count + 1 + len(extra.std)
+    found = np.zeros((width, width))
+    stds = np.ones((count, OF_TUBE))
+    stds[:, BIAS], stds[:, TILT] = string.bias_std[:, None], string.tilt_std[:, None]
+    others = np.concatenate([stds.ravel(), [string.gravity_std], extra.std])
+    np.fill_diagonal(found, others**-2.0)
+    turns = turn_places(count)
+    found[np.ix_(turns, turns)] = np.linalg.inv(string.turn_cov)
+    return found
+
+
+def turn_places(count: int) -> npt.NDArray[np.intp]:
+    """Places of the turns of so many tubes among what all stations have in common."""
+    return np.arange(count) * OF_TUBE + TURN
+
+
+def string_departure(string: StringPrior, start: StartingPoint) -> Array:
+    """By how much (p,) tubes, gravity and further effects stand off what was known of them before."""
+    tubes = start.tubes.copy()
+    tubes[:, TURN] -= string.turn
+    return np.concatenate([tubes.ravel(), [start.gravity - string.gravity], start.extra])

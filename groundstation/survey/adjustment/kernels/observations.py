@@ -1,0 +1,142 @@
+"""What a look should read, how that changes with every unknown, and how much it counts.
+
+A tube that lies along the unit vector d and is turned by psi about it reads, at rest,
+
+    f = g (m + tilt x m) + b,    m = (R(-psi) (d_N, d_E), -d_D),
+
+and its yaw is psi plus the turn of its chain plus an error of its own, which is estimated look by look: a yaw that is
+hardly known puts the lean on a circle, not on a straight line. What is left is linear.
+Source: thesis eqs. 1.1-1.3; Gauss and Newton's method.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from node.kernels.arithmetic.jit import kernel
+
+Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
+
+
+@kernel
+def linearise_looks(
+    station: Places, tube: Places, force: Array, force_var: Array, yaw: Array, yaw_var: Array, tangents: Array,
+    bases: Array, tubes: Array, gravity: float, play_var: float, jacobians: Array, weights: Array, residuals: Array,
+    yaw_errors: Array,
+) -> None:  # fmt: skip
+    """Linearise every look where the unknowns stand.
+
+    Parameters
+    ----------
+    station, tube, force, force_var, yaw, yaw_var : of the looks, see ``Looks``
+    tangents, bases : (s + 1, 3) and (s + 1, 2, 3), directions and two unit vectors across each
+    tubes : (m, 6), bias, tilt and turn of every tube
+    gravity, play_var : m/s^2, and rad^2 of each axis of the tilt of a tube in the hole
+    jacobians : (n, 3, 9) set: change of the force by direction (2), bias (3), tilt (2), turn and gravity
+    weights, residuals : (n, 3, 3) and (n, 3) set: inverse covariance, and what was read less what should be
+    yaw_errors : (n,) rad, set: the error of each yaw that fits best
+    """
+    for k in range(len(station)):
+        d, basis, own, f = tangents[station[k]], bases[station[k]], tubes[tube[k]], force[k]
+        psi = yaw[k] - own[5]
+        c, s = math.cos(psi), math.sin(psi)
+        mx, my, mz = c * d[0] + s * d[1], c * d[1] - s * d[0], -d[2]
+        tx, ty = own[3], own[4]
+        # the yaw's error: that which turns the predicted lean to the measured, as far as the yaw may be wrong
+        px = gravity * (mx + ty * mz) + own[0]
+        py = gravity * (my - tx * mz) + own[1]
+        lean = px * px + py * py
+        across = math.atan2(f[0] * py - f[1] * px, f[0] * px + f[1] * py)
+        noise = force_var[k] + gravity * gravity * play_var * mz * mz
+        e = across * yaw_var[k] / (yaw_var[k] + noise / max(lean, 1e-12))
+        c, s = math.cos(psi - e), math.sin(psi - e)
+        mx, my = c * d[0] + s * d[1], c * d[1] - s * d[0]
+        jacobian, weight, residual = jacobians[k], weights[k], residuals[k]
+        jacobian[:] = 0.0
+        for a in range(2):
+            v = basis[a]
+            vx, vy, vz = c * v[0] + s * v[1], c * v[1] - s * v[0], -v[2]
+            jacobian[0, a] = gravity * (vx + ty * vz)
+            jacobian[1, a] = gravity * (vy - tx * vz)
+            jacobian[2, a] = gravity * (vz + tx * vy - ty * vx)
+        for a in range(3):
+            jacobian[a, 2 + a] = 1.0
+        jacobian[1, 5], jacobian[2, 5] = -gravity * mz, gravity * my
+        jacobian[0, 6], jacobian[2, 6] = gravity * mz, -gravity * mx
+        jacobian[0, 7], jacobian[1, 7] = -gravity * my, gravity * mx
+        jacobian[2, 7] = gravity * (tx * mx + ty * my)
+        jacobian[0, 8], jacobian[1, 8], jacobian[2, 8] = mx + ty * mz, my - tx * mz, mz + tx * my - ty * mx
+        for a in range(3):
+            residual[a] = f[a] - gravity * jacobian[a, 8] - own[a] + jacobian[a, 7] * e
+            for b in range(3):
+                tilted = jacobian[a, 5] * jacobian[b, 5] + jacobian[a, 6] * jacobian[b, 6]
+                weight[a, b] = play_var * tilted + yaw_var[k] * jacobian[a, 7] * jacobian[b, 7]
+            weight[a, a] += force_var[k]
+        invert_in_place(weight)
+        yaw_errors[k] = e
+
+
+@kernel
+def invert_in_place(m: Array) -> None:
+    """Invert a symmetric positive definite matrix (3, 3)."""
+    a, b, c, d, e, f = m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]
+    ca, cb, cc = d * f - e * e, c * e - b * f, b * e - c * d
+    det = a * ca + b * cb + c * cc
+    m[0, 0], m[0, 1], m[0, 2] = ca / det, cb / det, cc / det
+    m[1, 1], m[1, 2], m[2, 2] = (a * f - c * c) / det, (b * c - a * e) / det, (a * d - b * b) / det
+    m[1, 0], m[2, 0], m[2, 1] = m[0, 1], m[0, 2], m[1, 2]
+
+
+@kernel
+def add_looks(
+    station: Places, tube: Places, jacobians: Array, weights: Array, residuals: Array, extra: Array, gravity_at: int,
+    at_station: Array, coupled: Array, in_common: Array,
+) -> None:  # fmt: skip
+    """Add the looks to the normal equations.
+
+    Parameters
+    ----------
+    station, tube, jacobians, weights, residuals : as they were linearised
+    extra : (n, 3, e), columns of further effects
+    gravity_at : column of gravity among those of all stations; those of a tube begin at six times its place, and
+        those of further effects behind that of gravity
+    at_station : (s + 1, 2, 2), information on every direction, added to
+    coupled : (s + 1, 2, p + 1), of direction and what stations have in common; the last column is the right side
+    in_common : (p + 1, p + 1), of what they have in common; the last column is the right side
+    """
+    count = extra.shape[2]
+    width = 7 + count
+    right = gravity_at + 1 + count
+    at = np.empty(width + 1, np.intp)
+    rows = np.empty((3, width + 1))
+    weighed = np.empty((3, width + 1))
+    for k in range(len(station)):
+        j, w = jacobians[k], weights[k]
+        for a in range(6):
+            at[a] = 6 * tube[k] + a
+            rows[:, a] = j[:, 2 + a]
+        at[6] = gravity_at
+        rows[:, 6] = j[:, 8]
+        for a in range(count):
+            at[7 + a] = gravity_at + 1 + a
+            rows[:, 7 + a] = extra[k, :, a]
+        at[width] = right
+        rows[:, width] = residuals[k]
+        for a in range(3):
+            for b in range(width + 1):
+                weighed[a, b] = w[a, 0] * rows[0, b] + w[a, 1] * rows[1, b] + w[a, 2] * rows[2, b]
+        own, common = at_station[station[k]], coupled[station[k]]
+        for a in range(2):
+            for b in range(2):
+                for i in range(3):
+                    own[a, b] += j[i, a] * (w[i, 0] * j[0, b] + w[i, 1] * j[1, b] + w[i, 2] * j[2, b])
+            for b in range(width + 1):
+                common[a, at[b]] += j[0, a] * weighed[0, b] + j[1, a] * weighed[1, b] + j[2, a] * weighed[2, b]
+        for a in range(width):
+            for b in range(width + 1):
+                total = rows[0, a] * weighed[0, b] + rows[1, a] * weighed[1, b] + rows[2, a] * weighed[2, b]
+                in_common[at[a], at[b]] += total

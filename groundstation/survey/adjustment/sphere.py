@@ -1,0 +1,50 @@
+"""Directions on the unit sphere: unit vectors across them, carried along a hole, and steps from one to another."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+TINY = 1e-12
+
+
+def carried_bases(tangents: Array) -> Array:
+    """Two unit vectors across each of the directions (s, 3), (s, 2, 3), carried from each to the next without twist.
+
+    At the first direction they are as near to north and east as can be.
+    """
+    bases = np.empty((len(tangents), 2, 3))
+    d = tangents[0]
+    first = np.array([1.0, 0.0, 0.0]) if abs(d[0]) < 0.9 else np.array([0.0, 0.0, -np.sign(d[0])])
+    north = first - (first @ d) * d
+    bases[0, 0] = north / np.linalg.norm(north)
+    bases[0, 1] = np.cross(d, bases[0, 0])
+    for k, (before, after) in enumerate(itertools.pairwise(tangents)):
+        middle = before + after
+        # the rotation along the great circle from one to the other is two reflections
+        reflected = bases[k] - np.outer(bases[k] @ middle, middle) * (2.0 / max(middle @ middle, TINY))
+        bases[k + 1] = reflected - 2.0 * np.outer(reflected @ after, after) if middle @ middle > TINY else bases[k]
+        bases[k + 1] -= np.outer(bases[k + 1] @ after, after)
+        bases[k + 1, 0] /= np.linalg.norm(bases[k + 1, 0])
+        bases[k + 1, 1] = np.cross(after, bases[k + 1, 0])
+    return bases
+
+
+def bends_between(tangents: Array, bases: Array) -> Array:
+    """Bend (s, 2), rad, from each direction to the next along the great circle, in the basis of the former."""
+    before, after = tangents[:-1], tangents[1:]
+    across = np.einsum("kai,ki->ka", bases[:-1], after)
+    size = np.linalg.norm(across, axis=1)
+    angle = np.arctan2(size, np.einsum("ki,ki->k", before, after))
+    return np.asarray(across * np.where(size > TINY, angle / np.maximum(size, TINY), 1.0)[:, None])
+
+
+def step_directions(tangents: Array, bases: Array, steps: Array) -> Array:
+    """Directions (s, 3) after a step (s, 2), rad, along a great circle from each."""
+    angle = np.linalg.norm(steps, axis=1, keepdims=True)
+    toward = np.einsum("ka,kai->ki", steps, bases) * np.sinc(angle / np.pi)
+    moved = np.cos(angle) * tangents + toward
+    return np.asarray(moved / np.linalg.norm(moved, axis=1, keepdims=True))
