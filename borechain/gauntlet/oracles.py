@@ -11,6 +11,7 @@ import msgpack
 
 from borechain.gauntlet.gauntlet_rig import GauntletRig
 from groundstation.service.hole.surveyed_hole import SurveyedHole
+from sim.gauntlet.expected_doubts import misled_by
 from sim.gauntlet.fault import TUBES
 from sim.gauntlet.faulty_world import TUBE_LENGTH, FaultyWorld
 from sim.rig.report import wrap_deg
@@ -144,15 +145,18 @@ def find_violations(
     """Every oracle that does not hold at the end, in words; ``seen`` are the alarms that the crew saw meanwhile.
 
     Where the encoder cannot be judged, its failure showing in nothing that measures, directions are not; where the
-    depth cannot, neither is what it places and what it says is missing. Events are
-    not sent again, so an alarm that rests on them is lost with a database that is deleted or replaced under a
-    crew that has seen it.
+    depth cannot, neither is what it places and what it says is missing. Likewise of what a deception makes wrong, see
+    ``sim.gauntlet.expected_doubts``. Events are not sent again, so an alarm that rests on them is lost with a database
+    that is deleted or replaced under a crew that has seen it.
     """
     shown = rig.inline.ask("alarms")
     standing = {row["code"] for row in shown["rig"]}
     warned = standing | (set(seen) if rig.disk(BASE).handled else set())
     told = standing | {row["code"] for row in shown["rig_cleared"]}
     rows = rig.inline.ask("measurements")["measurements"]
+    misled = misled_by(rig.world.deceptions)
+    depth_can_be_judged = depth_can_be_judged and "depth" not in misled
+    encoder_can_be_judged = encoder_can_be_judged and "direction" not in misled
     return [
         *_each_once(rows),
         *(() if standing & DEPTH or not depth_can_be_judged else _depths(rows, rig.world)),
