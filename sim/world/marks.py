@@ -33,18 +33,16 @@ class Marks:
 
     def __init__(self, scenario: Scenario, seed: int, motion: Motion) -> None:
         self._tubes, self._rig = scenario.tubes, scenario.file.rig
-        self._section, self._rough, self._told = scenario.file.joints, scenario.file.rough, scenario.file.told
+        self._section, self._rough, self._wrong = scenario.file.joints, scenario.file.rough, scenario.file.told
         self._seed = seed
         self.made_up = motion.make_ups if self._rig.tubes_at_start else motion.make_ups[1:]
 
     def read(self, tube: int) -> PassedTube:
-        """What the crew tells of a tube: what it reads from the scribe marks, or what a node starts with."""
+        """What the crew reads from the scribe marks of a tube."""
         std = math.radians(self._section.reading_std_deg)
         drive, lower = self._joint_angles
         drive_error, lower_error = self._joint_errors
-        if self._told.joints == "untold":
-            return PassedTube(MakeUpAngle(0.0, std), MakeUpAngle(0.0, std))
-        drive_misread, lower_misread = self._told.misread(tube)
+        drive_misread, lower_misread = self._wrong.misread(tube)
         misread = self._misread(tube) + drive_misread
         return PassedTube(
             MakeUpAngle(wrap_angle(drive[tube] - self._turned_before(tube) + drive_error[tube] + misread), std),

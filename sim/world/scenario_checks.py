@@ -207,7 +207,10 @@ def _check_pair(path: Path, file: ScenarioFile, key: str, tubes: tuple[int, int]
 def _check_told(path: Path, file: ScenarioFile) -> None:
     told = file.told
     _check_tube(path, file, "told.joint_tube", told.joint_tube)
-    _check_tube(path, file, "told.length_tube", told.length_tube)
+    if len(told.lengths_off_m) > file.rig.tubes:
+        raise ScenarioError(
+            f"{path}: told.lengths_off_m: expected at most {file.rig.tubes}, one a tube, got {len(told.lengths_off_m)}"
+        )
     if told.depth_stuck_s is not None and told.depth_stuck_after_s is None:
         raise ScenarioError(f"{path}: told.depth_stuck_s: expected depth_stuck_after_s with it")
 

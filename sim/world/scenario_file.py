@@ -281,7 +281,7 @@ class ScenarioFile(ScenarioSection):
     node: NodeSection = NodeSection()
     design: DesignSection = DesignSection()
     drift: DriftSection | None = None
-    told: ToldSection = Field(ToldSection(), description="what the crew tells wrongly, or not at all")
+    told: ToldSection = Field(ToldSection(), description="what the crew tells wrongly")
     calibration: CalibrationSection | None = None
     site: SiteSection | None = Field(
         None, description="a wall whose holes are drilled one after the other, each straight in place of the path"

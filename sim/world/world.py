@@ -16,6 +16,7 @@ from node.firmware.tube_settings import TubeSettings
 from node.kernels.record.filter_record import Scheme
 from sim.errors import ScenarioError
 from sim.node_kills import KillNode
+from sim.world.depth_meter import DepthMeter
 from sim.world.drill_string import DrillString
 from sim.world.radio import RadioLinks
 from sim.world.random_streams import RandomStream, random_stream
@@ -45,6 +46,7 @@ class World(DrillString):
         self.faults: tuple[KillNode, ...] = scenario.faults
         self._check_faults()
         self.radio = self._radio_links()
+        self.depth_meter = DepthMeter(scenario, seed, self.motion, self.begin)
 
     def aided_like(self, scenario: Scenario) -> World:
         """The same world under the aiding of another scenario: what was worked out of it holds for either."""
@@ -82,16 +84,7 @@ class World(DrillString):
 
     def measured_depth(self, t: float) -> float:
         """Depth of the bit as the rig measures it, m."""
-        told = self.scenario.file.told
-        depth = self.bit_depth(t)
-        if told.depth_stuck_after_s is not None:
-            depth -= self._missed_depth(t, self.begin + told.depth_stuck_after_s, told.depth_stuck_s)
-        return depth * (1.0 + told.depth_scale)
-
-    def _missed_depth(self, t: float, at: float, lasts: float | None) -> float:
-        """Depth (m) that a meter has missed which stood still from ``at`` (s, rig time) on, for a time (s) or ever."""
-        until = t if lasts is None else min(t, at + lasts)
-        return self.bit_depth(until) - self.bit_depth(at) if until > at else 0.0
+        return self.depth_meter.measure_depth(t)
 
     def local_clock(self, address: int, t: float) -> float:
         """What the clock of a process shows at rig time ``t`` (s)."""

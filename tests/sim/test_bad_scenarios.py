@@ -80,7 +80,11 @@ def refusal(scenario: Path, *faults: str) -> str:
             "exactly one of displacements, stations, straight, spiral and drawn, got 2",
         ),
         ("[rig]", "[told]\njoint_tube = 4\njoint_deg = 1\n[rig]", "told.joint_tube: expected one of 3 tubes, got 4"),
-        ("[rig]", "[told]\nlength_tube = 9\n[rig]", "told.length_tube: expected one of 3 tubes, got 9"),
+        (
+            "[rig]",
+            "[told]\nlengths_off_m = [0, 0, 0, 1]\n[rig]",
+            "told.lengths_off_m: expected at most 3, one a tube, got 4",
+        ),
         ("[rig]", "[told]\ndepth_stuck_s = 9\n[rig]", "told.depth_stuck_s: expected depth_stuck_after_s with it"),
         ("[rig]", "[told]\ndepth_scale = 1.0\n[rig]", "told.depth_scale"),
         ("[rig]", "[path.moved]\nafter_s = 9\nfrom_m = 4\nto_m = 3\n[rig]", "path.moved.to_m: expected more than"),

@@ -37,12 +37,6 @@ def test_a_joint_is_told_wrong_and_no_other() -> None:
         assert wrong.yaw_truth(tube, wrong.end) == honest.yaw_truth(tube, honest.end)
 
 
-def test_joints_that_nobody_told_are_what_a_node_starts_with() -> None:
-    for tube in range(1, 5):
-        settings = told(joints="untold").tube_settings(tube)
-        assert settings.drive_joint.angle == settings.lower_joint.angle == 0.0
-
-
 @pytest.mark.parametrize("north_deg", [12.0, -150.0])
 @pytest.mark.parametrize("rough", [False, True])
 def test_an_encoder_whose_zero_is_off_counts_that_much_less(north_deg: float, rough: bool) -> None:
@@ -69,7 +63,7 @@ def test_its_edges_pass_where_the_head_is() -> None:
 
 
 def test_a_tube_that_is_longer_lifts_those_above_it() -> None:
-    honest, longer = world_of(), told(length_tube=2, length_off_m=0.3)
+    honest, longer = world_of(), told(lengths_off_m=(0.0, 0.3))
     assert [longer.below(tube) for tube in range(1, 5)] == pytest.approx([0.0, 2.0, 4.3, 6.3])
     at = np.array([honest.end - 1.0])
     bit = honest.bit_depth(float(at[0]))
@@ -79,11 +73,26 @@ def test_a_tube_that_is_longer_lifts_those_above_it() -> None:
         assert math.acos(-force[2] / np.linalg.norm(force)) == pytest.approx(inclination, abs=1e-9)
 
 
-def test_a_depth_that_counts_too_much() -> None:
-    world = told(depth_scale=0.05)
+def test_a_depth_that_counts_too_much_from_another_zero() -> None:
+    world = told(depth_scale=0.05, depth_offset_m=-0.2)
     for at in world.ends[:: world.cycles // 7]:
-        assert world.measured_depth(float(at)) == pytest.approx(1.05 * world.bit_depth(float(at)))
+        assert world.measured_depth(float(at)) == pytest.approx(1.05 * world.bit_depth(float(at)) - 0.2)
     assert world.bit_depth(world.end) == pytest.approx(8.0)
+
+
+def test_a_depth_errs_anew_at_every_stop_and_by_one_number_there() -> None:
+    errors = []
+    for seed in range(1, 101):
+        world = world_of(seed, told={"depth_std_m": 0.01})
+        stops = [phase for phase in world.phases if phase.kind == "stop"]
+        for stop in stops:
+            found = {round(world.measured_depth(t) - world.bit_depth(t), 12) for t in (stop.start, stop.end)}
+            assert len(found) == 1
+            errors += found
+    assert len(set(errors)) == 4 * 100
+    assert np.std(errors) == pytest.approx(0.01, rel=0.15)
+    by_stop = np.reshape(errors, (100, 4))
+    assert abs(np.mean(by_stop[:, 1:] * by_stop[:, :-1])) < 4.0 * 1e-4 / math.sqrt(300)
 
 
 @pytest.mark.parametrize("lasts", [None, 100.0])
