@@ -63,6 +63,7 @@ class FaultyWorld(World):
     def __init__(self, scenario: Scenario, seed: int) -> None:
         super().__init__(scenario, seed)
         self._depths: dict[float, float] = {}
+        self._measured: dict[float, float] = {}  # m, of a rig without faults
         self._counted: dict[float, EncoderSample] = {}
         self._heal()
 
@@ -80,6 +81,7 @@ class FaultyWorld(World):
     def forget(self) -> None:
         """Drop computed values of times that will not come again."""
         self._depths.clear()
+        self._measured.clear()
         self._counted.clear()
 
     def _heal(self) -> None:
@@ -193,8 +195,10 @@ class FaultyWorld(World):
 
     def measured_depth(self, t: float) -> float:
         """Depth of the bit as the rig measures it, m."""
+        if t not in self._measured:
+            self._measured[t] = super().measured_depth(t)
         counted = sum(scale * max(self.bit_depth(t) - since, 0.0) for since, scale in self._scales)
-        return max(super().measured_depth(t) + counted + self.depth_error, 0.0)
+        return max(self._measured[t] + counted + self.depth_error, 0.0)
 
     def bit_depth(self, t: float) -> float:
         """Depth of the bit along the hole, m."""
