@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from borechain.studies.drawn_rigs import KnownSetUp
+from groundstation.config import GroundConfig
 from groundstation.service.hole.station import SurveyStation
 from groundstation.service.hole.surveyed_hole import SurveyedHole
 from sim.world.world import World
@@ -136,7 +137,7 @@ def path_covariance(md: Array, collar_std: float, curvature_std: float, length: 
     return np.kron(collar_std**2 + curvature_std**2 * bent, np.eye(2))
 
 
-def best_of_rig(world: World, hole: SurveyedHole, known: KnownSetUp) -> Array:
+def best_of_rig(world: World, hole: SurveyedHole, config: GroundConfig, known: KnownSetUp) -> Array:
     """Best standard deviations (s,), rad, of the directions at the stations of a rig, over two axes.
 
     The looks are those that the ground station has; the path is known before as the ground station knows it.
@@ -154,8 +155,7 @@ def best_of_rig(world: World, hole: SurveyedHole, known: KnownSetUp) -> Array:
         np.full(len(rows), float(np.mean(force_var))),
         world.scenario.hole.tangent(depths)[0],
     )
-    file, config = world.scenario.file, hole.config
-    gravity = file.accelerometer.gravity_mps2
+    gravity = world.scenario.file.accelerometer.gravity_mps2
     path = path_covariance(
         depths,
         math.radians(known.collar_deg),
@@ -186,7 +186,7 @@ def at_station(world: World, rows: list[tuple[float, ...]], place: int) -> list[
 
 
 def turn_covariance(tubes: int, known: KnownSetUp) -> Array:
-    """Covariance (m, m), rad^2, of what the yaws of tubes are wrong by, of joints that add up from the top tube down."""
+    """Covariance (m, m), rad^2, of the yaws of tubes: mounts, joints that add up from the top down, north."""
     mounts = math.radians(known.mount_deg) ** 2 * np.eye(tubes)
     numbers = np.arange(tubes)
     above = tubes - np.maximum(numbers[:, None], numbers)  # joints that two tubes have above them both

@@ -12,7 +12,7 @@ from groundstation.report.style import SERIES, new_figure, styled
 
 @styled
 def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:
-    """Share of rigs whose position lies inside the region of a probability, at the first, a middle and the last station."""
+    """Share of rigs whose position is inside the region of a probability, at three stations."""
     from scipy.stats import chi2
 
     squares = result["traces"]["squares"]

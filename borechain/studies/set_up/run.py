@@ -119,7 +119,7 @@ def run_rig(draw: RigDraw) -> SetUpRun:
     world = World(scenario_of(dict(tables_of(draw))), draw.seed)
     with heard_ground(world) as ground:
         hole = ground.model.hole
-        return SetUpRun(judge_hole_of(world, hole), best_of_rig(world, hole, draw.known))
+        return SetUpRun(judge_hole_of(world, hole), best_of_rig(world, hole, ground.config, draw.known))
 
 
 def station_row(place: int, runs: Sequence[SetUpRun]) -> dict[str, Any]:
