@@ -82,14 +82,15 @@ def linearise_all(looks: Looks, now: StartingPoint, bases: Array, extra: Further
     jacobians, weights = np.empty((count, 3, 9)), np.empty((count, 3, 3))
     residuals, yaw_errors = np.empty((count, 3)), np.empty(count)
     linearise_looks(
-        looks.station, looks.tube, looks.force, looks.force_var, looks.yaw, looks.yaw_var, now.tangents, bases,
-        now.tubes, now.gravity, now.play_var, jacobians, weights, residuals, yaw_errors,
+        looks.station, looks.tube, looks.make_up, looks.force, looks.force_var, looks.yaw, looks.yaw_var,
+        now.tangents, bases, now.tubes, now.make_ups, now.gravity, now.play_var, jacobians, weights, residuals,
+        yaw_errors,
     )  # fmt: skip
     if len(now.extra):
         residuals -= extra.columns @ now.extra
     squares = np.einsum("ka,kab,kb->k", residuals, weights, residuals)
     weights *= np.sqrt(GROSS / np.maximum(squares, GROSS))[:, None, None]
-    return Linearised(bases, jacobians, weights, residuals, squares)
+    return Linearised(bases, jacobians, weights, residuals, squares, now.tubes.size)
 
 
 def solve_equations(
@@ -129,10 +130,9 @@ def gather_equations(
     in_common[:size, :size] = known
     in_common[:size, size] = -known @ departure
     at_station, by_direction = np.zeros((count, 2, 2)), np.zeros((count, 2, size + 1))
-    gravity_at = size - 1 - len(extra.std)
     add_looks(
-        looks.station, looks.tube, linear.jacobians, linear.weights, linear.residuals, extra.columns, gravity_at,
-        at_station, by_direction, in_common,
+        looks.station, looks.tube, looks.make_up, linear.jacobians, linear.weights, linear.residuals, extra.columns,
+        linear.gravity_at, at_station, by_direction, in_common,
     )  # fmt: skip
     diagonal[:, :2, :2] += at_station
     coupled[:, :2] = by_direction
@@ -142,12 +142,14 @@ def gather_equations(
 
 def _stepped(now: StartingPoint, bases: Array, solution: LinearSolution) -> StartingPoint:
     """Where the unknowns stand after a step."""
-    tubes = now.tubes + solution.common[: now.tubes.size].reshape(-1, OF_TUBE)
+    size = now.tubes.size
+    make_ups = slice(size + 1, size + 1 + len(now.make_ups))
     return StartingPoint(
         step_directions(now.tangents, bases, solution.states[:, :2]),
         now.curvatures + solution.states[:, 2:],
-        tubes,
-        now.gravity + float(solution.common[now.tubes.size]),
+        now.tubes + solution.common[:size].reshape(-1, OF_TUBE),
+        now.make_ups + solution.common[make_ups],
+        now.gravity + float(solution.common[size]),
         now.play_var,
-        now.extra + solution.common[now.tubes.size + 1 :],
+        now.extra + solution.common[make_ups.stop :],
     )

@@ -9,7 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.kernels.path_elimination import path_covariances, reduce_right, substitute_path
-from groundstation.survey.adjustment.looks import OF_TUBE, FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
+from groundstation.survey.adjustment.looks import (
+    OF_TUBE,
+    TURN,
+    FurtherEffects,
+    Looks,
+    PathPrior,
+    StartingPoint,
+    StringPrior,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -23,6 +31,7 @@ class Linearised:
     weights: Array
     residuals: Array
     squares: Array
+    gravity_at: int  # place of gravity among what stations have in common, behind the tubes
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +75,11 @@ class Adjusted:
     known: Array
 
     @property
+    def bases(self) -> Array:
+        """Two unit vectors (s + 1, 2, 3) across the direction at collar and stations, in which their errors are."""
+        return self.linear.bases
+
+    @property
     def common_cov(self) -> Array:
         """Covariance (p, p) of what stations have in common."""
         return self.solution.cov
@@ -102,15 +116,16 @@ class Adjusted:
 
     @property
     def _extra_step(self) -> Array:
-        return self.solution.common[OF_TUBE * self.string.count + 1 :]
+        return self.solution.common[self.string.width :]
 
     @property
     def _step_of_looks(self) -> Array:
         """Last step of the nine unknowns of every look (n, 9)."""
         size = OF_TUBE * self.string.count
-        tubes = self.solution.common[:size].reshape(-1, OF_TUBE)
+        tubes = self.solution.common[:size].reshape(-1, OF_TUBE)[self.looks.tube]
+        tubes[:, TURN] += self.solution.common[size + 1 + self.looks.make_up]
         gravity = np.full((len(self.looks), 1), self.solution.common[size])
-        return np.concatenate([self.solution.states[self.looks.station, :2], tubes[self.looks.tube], gravity], axis=1)
+        return np.concatenate([self.solution.states[self.looks.station, :2], tubes, gravity], axis=1)
 
     def cofactor(self, directions: Array, common: Array) -> tuple[Array, Array]:
         """Covariance of all unknowns times columns: of directions (s + 1, 2, r) and of what is in common (p, r).
@@ -133,7 +148,8 @@ class Adjusted:
         found = np.empty((len(self.looks), 3, 3))
         direction = self.by_common[:, :2]
         free_parts(
-            self.looks.station, self.looks.tube, self.linear.jacobians, self.linear.weights, self.extra.columns,
+            self.looks.station, self.looks.tube, self.looks.make_up, self.linear.jacobians, self.linear.weights,
+            self.extra.columns,
             OF_TUBE * self.string.count, self.covs[:, :2, :2].copy(),
             (direction @ self.common_cov), self.common_cov, found,
         )  # fmt: skip

@@ -77,24 +77,27 @@ def _for_both_axes(matrices: Array) -> Array:
 def string_information(string: StringPrior, extra: FurtherEffects) -> Array:
     """Information (p, p) on tubes, gravity and further effects before any look."""
     count = string.count
-    width = OF_TUBE * count + 1 + len(extra.std)
+    width = string.width + len(extra.std)
     found = np.zeros((width, width))
     stds = np.ones((count, OF_TUBE))
     stds[:, BIAS], stds[:, TILT] = string.bias_std[:, None], string.tilt_std[:, None]
-    others = np.concatenate([stds.ravel(), [string.gravity_std], extra.std])
+    make_ups = np.ones(len(string.turn) - count)
+    others = np.concatenate([stds.ravel(), [string.gravity_std], make_ups, extra.std])
     np.fill_diagonal(found, others**-2.0)
-    turns = turn_places(count)
+    turns = turn_places(string)
     found[np.ix_(turns, turns)] = np.linalg.inv(string.turn_cov)
     return found
 
 
-def turn_places(count: int) -> npt.NDArray[np.intp]:
-    """Places of the turns of so many tubes among what all stations have in common."""
-    return np.arange(count) * OF_TUBE + TURN
+def turn_places(string: StringPrior) -> npt.NDArray[np.intp]:
+    """Places (m + u,) of the turns of tubes and of make-ups among what all stations have in common."""
+    tubes = np.arange(string.count) * OF_TUBE + TURN
+    return np.concatenate([tubes, np.arange(OF_TUBE * string.count + 1, string.width)])
 
 
 def string_departure(string: StringPrior, start: StartingPoint) -> Array:
-    """By how much (p,) tubes, gravity and further effects stand off what was known of them before."""
+    """By how much (p,) tubes, gravity, make-ups and further effects stand off what was known of them before."""
     tubes = start.tubes.copy()
-    tubes[:, TURN] -= string.turn
-    return np.concatenate([tubes.ravel(), [start.gravity - string.gravity], start.extra])
+    tubes[:, TURN] -= string.turn[: string.count]
+    make_ups = start.make_ups - string.turn[string.count :]
+    return np.concatenate([tubes.ravel(), [start.gravity - string.gravity], make_ups, start.extra])

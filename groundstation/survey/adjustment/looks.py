@@ -24,6 +24,7 @@ class Looks:
     ----------
     station : (n,) place of the station in the order of depth, from 1; 0 is the collar, which no tube reads
     tube : (n,) place of the tube among those of the string
+    make_up : (n,) which of the ways it was that the string was made up: a tube that is added on top turns all others
     stop : (n,) number of the stop of the string, which grows with time
     force : (n, 3) m/s^2, mean specific force in the tube's frame
     force_var : (n,) (m/s^2)^2, of each axis of the mean
@@ -32,6 +33,7 @@ class Looks:
 
     station: Places
     tube: Places
+    make_up: Places
     stop: Places
     force: Array
     force_var: Array
@@ -50,8 +52,9 @@ class StringPrior:
     ----------
     bias_std : (m,) m/s^2, of each axis of a tube's accelerometer
     tilt_std : (m,) rad, of its mount about x and y
-    turn : (m,) rad, by which the yaw that a tube reports is larger than its own, as far as that is known
-    turn_cov : (m, m) rad^2, of that: what joints, mounts and the encoder's zero have in common is in it
+    turn : (m + u,) rad, by which the yaw that a tube reports is larger than its own, as far as that is known: the sum
+        of a turn of its tube and one of the make-up of the string, of which there were u
+    turn_cov : (m + u, m + u) rad^2, of these: what joints, mounts and the encoder's zero have in common is in it
     gravity, gravity_std : m/s^2
     play_std : rad, of the tilt of a tube in the hole at one stop, before the looks tell it
     """
@@ -66,8 +69,13 @@ class StringPrior:
 
     @property
     def count(self) -> int:
-        """Number of tubes."""
+        """Number m of tubes."""
         return len(self.bias_std)
+
+    @property
+    def width(self) -> int:
+        """Number of unknowns of tubes, gravity and make-ups."""
+        return 5 * self.count + 1 + len(self.turn)
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +118,7 @@ class StartingPoint:
     tangents: Array  # (s + 1, 3)
     curvatures: Array  # (s + 1, 2) rad/m
     tubes: Array  # (m, 6)
+    make_ups: Array  # (u,) rad
     gravity: float
     play_var: float
     extra: Array = field(default_factory=lambda: np.zeros(0))

@@ -16,31 +16,44 @@ def first_start(looks: Looks, string: StringPrior, path: PathPrior) -> StartingP
 
     Where a station has no look it goes on as the one above it.
     """
-    tubes = np.zeros((string.count, OF_TUBE))
-    tubes[:, TURN] = string.turn
-    stds = np.sqrt(np.diag(string.turn_cov))
-    is_known = stds <= max(KNOWN_TURN, 1.000001 * float(stds.min(initial=np.inf)))
-    by_known = np.where(is_known[looks.tube], 1.0, 0.0)
-    tangents = _mean_directions(looks, tubes, path, by_known)
-    for tube in np.flatnonzero(~is_known).tolist():
-        own = (looks.tube == tube) & (_counts(looks, path, by_known)[looks.station] > 0.0)
-        seen = looks.force[own, 0] + 1j * looks.force[own, 1]
-        there = (tangents[looks.station[own], 0] + 1j * tangents[looks.station[own], 1]) * np.exp(-1j * looks.yaw[own])
-        turn = -np.angle(np.sum(seen * there.conj()))
-        tubes[tube, TURN] = string.turn[tube] + np.angle(np.exp(1j * (turn - string.turn[tube])))
+    turns = string.turn.copy()
+    vars_of_looks = _vars_of_turns(looks, string)
+    is_known = vars_of_looks <= max(KNOWN_TURN**2, 1.000001 * float(vars_of_looks.min(initial=np.inf)))
+    tangents = _mean_directions(looks, looks.yaw - _turns(looks, string, turns), path, is_known.astype(np.float64))
     if not is_known.all():
-        tangents = _mean_directions(looks, tubes, path, np.ones(len(looks)))
-    return StartingPoint(tangents, np.zeros((len(path.md), 2)), tubes, string.gravity, string.play_std**2)
+        seen_there = np.bincount(looks.station[is_known], minlength=len(path.md)) > 0
+        _find_turns(looks, string, turns, tangents, ~is_known & seen_there[looks.station])
+        tangents = _mean_directions(looks, looks.yaw - _turns(looks, string, turns), path, np.ones(len(looks)))
+    tubes = np.zeros((string.count, OF_TUBE))
+    tubes[:, TURN], make_ups = turns[: string.count], turns[string.count :]
+    curvatures = np.zeros((len(path.md), 2))
+    return StartingPoint(tangents, curvatures, tubes, make_ups, string.gravity, string.play_std**2)
 
 
-def _counts(looks: Looks, path: PathPrior, weights: Array) -> Array:
-    return np.asarray(np.bincount(looks.station, weights, minlength=len(path.md)), np.float64)
+def _turns(looks: Looks, string: StringPrior, turns: Array) -> Array:
+    return turns[looks.tube] + turns[string.count + looks.make_up]
 
 
-def _mean_directions(looks: Looks, tubes: Array, path: PathPrior, weights: Array) -> Array:
-    """Weighted mean directions (s + 1, 3) of the looks at each station."""
-    psi = looks.yaw - tubes[looks.tube, TURN]
-    turned = (looks.force[:, 0] + 1j * looks.force[:, 1]) * np.exp(1j * psi)
+def _vars_of_turns(looks: Looks, string: StringPrior) -> Array:
+    """Variance (n,), rad^2, of the turn of every look before."""
+    cov, tube, make_up = string.turn_cov, looks.tube, string.count + looks.make_up
+    return np.asarray(cov[tube, tube] + cov[make_up, make_up] + 2.0 * cov[tube, make_up])
+
+
+def _find_turns(looks: Looks, string: StringPrior, turns: Array, tangents: Array, unknown: Array) -> None:
+    """Turn first tubes and then make-ups whose turn is wide so that some looks agree with the directions there."""
+    seen = looks.force[:, 0] + 1j * looks.force[:, 1]
+    there = (tangents[looks.station, 0] + 1j * tangents[looks.station, 1]) * np.exp(-1j * looks.yaw)
+    wide = np.diag(string.turn_cov) > KNOWN_TURN**2
+    for place in np.flatnonzero(wide).tolist():
+        own = unknown & ((looks.tube == place) | (string.count + looks.make_up == place))
+        others = np.exp(1j * _turns(looks, string, turns)[own])
+        turns[place] -= np.angle(np.sum(seen[own] * (there[own] * others).conj()))
+
+
+def _mean_directions(looks: Looks, yaws: Array, path: PathPrior, weights: Array) -> Array:
+    """Weighted mean directions (s + 1, 3) of the looks at each station, with these yaws (n,) of their tubes."""
+    turned = (looks.force[:, 0] + 1j * looks.force[:, 1]) * np.exp(1j * yaws)
     units = np.stack([turned.real, turned.imag, -looks.force[:, 2]], axis=1)
     units /= np.linalg.norm(units, axis=1, keepdims=True)
     trusted = weights / (np.sin(np.sqrt(np.minimum(looks.yaw_var, 2.0))) ** 2 + 1e-8)

@@ -13,27 +13,28 @@ Places = npt.NDArray[np.intp]
 
 @kernel
 def free_parts(
-    station: Places, tube: Places, jacobians: Array, weights: Array, extra: Array, gravity_at: int, of_direction: Array,
-    coupled: Array, of_common: Array, out: Array,
+    station: Places, tube: Places, make_up: Places, jacobians: Array, weights: Array, extra: Array, gravity_at: int,
+    of_direction: Array, coupled: Array, of_common: Array, out: Array,
 ) -> None:  # fmt: skip
     """Set W - W J Q J^T W of every look (n, 3, 3).
 
     Parameters
     ----------
-    station, tube, jacobians, weights, extra, gravity_at : of the looks, see ``add_looks``
+    station, tube, make_up, jacobians, weights, extra, gravity_at : of the looks, see ``add_looks``
     of_direction, coupled, of_common : (s + 1, 2, 2), (s + 1, 2, p) and (p, p), covariance of the unknowns
     """
     count = extra.shape[2]
-    width = 9 + count
+    width, size = 10 + count, len(of_common)
     at = np.empty(width, np.intp)
     cov, rows = np.empty((width, width)), np.empty((3, width))
     for k in range(len(station)):
         rows[:, :9] = jacobians[k]
-        rows[:, 9:] = extra[k]
+        rows[:, 9], rows[:, 10:] = jacobians[k][:, 7], extra[k]
         for a in range(6):
             at[2 + a] = 6 * tube[k] + a
-        for a in range(1 + count):
-            at[8 + a] = gravity_at + a
+        at[8], at[9] = gravity_at, gravity_at + 1 + make_up[k]
+        for a in range(count):
+            at[10 + a] = size - count + a
         gather_covariance(of_direction[station[k]], coupled[station[k]], of_common, at, cov)
         take_from_weight(weights[k], rows, cov, out[k])
 

@@ -24,17 +24,17 @@ Places = npt.NDArray[np.intp]
 
 @kernel
 def linearise_looks(
-    station: Places, tube: Places, force: Array, force_var: Array, yaw: Array, yaw_var: Array, tangents: Array,
-    bases: Array, tubes: Array, gravity: float, play_var: float, jacobians: Array, weights: Array, residuals: Array,
-    yaw_errors: Array,
+    station: Places, tube: Places, make_up: Places, force: Array, force_var: Array, yaw: Array, yaw_var: Array,
+    tangents: Array, bases: Array, tubes: Array, make_ups: Array, gravity: float, play_var: float, jacobians: Array,
+    weights: Array, residuals: Array, yaw_errors: Array,
 ) -> None:  # fmt: skip
     """Linearise every look where the unknowns stand.
 
     Parameters
     ----------
-    station, tube, force, force_var, yaw, yaw_var : of the looks, see ``Looks``
+    station, tube, make_up, force, force_var, yaw, yaw_var : of the looks, see ``Looks``
     tangents, bases : (s + 1, 3) and (s + 1, 2, 3), directions and two unit vectors across each
-    tubes : (m, 6), bias, tilt and turn of every tube
+    tubes, make_ups : (m, 6) and (u,), bias, tilt and turn of every tube, and turn of every make-up
     gravity, play_var : m/s^2, and rad^2 of each axis of the tilt of a tube in the hole
     jacobians : (n, 3, 9) set: change of the force by direction (2), bias (3), tilt (2), turn and gravity
     weights, residuals : (n, 3, 3) and (n, 3) set: inverse covariance, and what was read less what should be
@@ -42,7 +42,7 @@ def linearise_looks(
     """
     for k in range(len(station)):
         d, basis, own, f = tangents[station[k]], bases[station[k]], tubes[tube[k]], force[k]
-        psi = yaw[k] - own[5]
+        psi = yaw[k] - own[5] - make_ups[make_up[k]]
         c, s = math.cos(psi), math.sin(psi)
         mx, my, mz = c * d[0] + s * d[1], c * d[1] - s * d[0], -d[2]
         tx, ty = own[3], own[4]
@@ -93,24 +93,24 @@ def invert_in_place(m: Array) -> None:
 
 @kernel
 def add_looks(
-    station: Places, tube: Places, jacobians: Array, weights: Array, residuals: Array, extra: Array, gravity_at: int,
-    at_station: Array, coupled: Array, in_common: Array,
+    station: Places, tube: Places, make_up: Places, jacobians: Array, weights: Array, residuals: Array, extra: Array,
+    gravity_at: int, at_station: Array, coupled: Array, in_common: Array,
 ) -> None:  # fmt: skip
     """Add the looks to the normal equations.
 
     Parameters
     ----------
-    station, tube, jacobians, weights, residuals : as they were linearised
+    station, tube, make_up, jacobians, weights, residuals : as they were linearised
     extra : (n, 3, e), columns of further effects
-    gravity_at : column of gravity among those of all stations; those of a tube begin at six times its place, and
-        those of further effects behind that of gravity
+    gravity_at : column of gravity among those of all stations; those of a tube begin at six times its place, those of
+        the make-ups follow that of gravity, and further effects are last
     at_station : (s + 1, 2, 2), information on every direction, added to
     coupled : (s + 1, 2, p + 1), of direction and what stations have in common; the last column is the right side
     in_common : (p + 1, p + 1), of what they have in common; the last column is the right side
     """
     count = extra.shape[2]
-    width = 7 + count
-    right = gravity_at + 1 + count
+    width = 8 + count
+    right = in_common.shape[1] - 1
     at = np.empty(width + 1, np.intp)
     rows = np.empty((3, width + 1))
     weighed = np.empty((3, width + 1))
@@ -119,11 +119,11 @@ def add_looks(
         for a in range(6):
             at[a] = 6 * tube[k] + a
             rows[:, a] = j[:, 2 + a]
-        at[6] = gravity_at
-        rows[:, 6] = j[:, 8]
+        at[6], at[7] = gravity_at, gravity_at + 1 + make_up[k]
+        rows[:, 6], rows[:, 7] = j[:, 8], j[:, 7]
         for a in range(count):
-            at[7 + a] = gravity_at + 1 + a
-            rows[:, 7 + a] = extra[k, :, a]
+            at[8 + a] = right - count + a
+            rows[:, 8 + a] = extra[k, :, a]
         at[width] = right
         rows[:, width] = residuals[k]
         for a in range(3):
