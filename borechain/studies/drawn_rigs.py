@@ -113,13 +113,13 @@ def play_as(known: KnownSetUp, play_deg: float) -> KnownSetUp:
     return replace(known, play_deg=play_deg)
 
 
-def changed(tables: Tables, **sections: dict[str, Any]) -> Tables:
+def change_tables(tables: Tables, **sections: dict[str, Any]) -> Tables:
     """The scenario with other values of some keys, and further disturbances."""
     disturbance = {**tables.get("disturbance", {}), **sections.pop("disturbance", {})}
     return {**change_sections(tables, **sections), "disturbance": disturbance}
 
 
-def rms(values: Any) -> float:
+def rms_of(values: Any) -> float:
     """Root mean square; NaN of nothing."""
     found = np.asarray(values, np.float64)
     return float(np.sqrt(np.mean(found**2))) if found.size else math.nan

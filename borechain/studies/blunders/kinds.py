@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from borechain.studies.drawn_rigs import TUBES, changed
+from borechain.studies.drawn_rigs import TUBES, change_tables
 from sim.studies.scenarios import Tables
 
 MIDDLE_S: Final = 640.0  # after the start
@@ -42,7 +42,7 @@ def of_disturbance(name: str, keys: Callable[[float], dict[str, Any]]) -> Change
 
     def change(tables: Tables, size: float) -> Tables:
         own = {"tube": TUBE, "after_s": MIDDLE_S, **keys(size)}
-        return changed(tables, disturbance={name: own})
+        return change_tables(tables, disturbance={name: own})
 
     return change
 
@@ -52,7 +52,7 @@ def of_told(keys: Callable[[float], dict[str, Any]]) -> Change:
 
     def change(tables: Tables, size: float) -> Tables:
         told = tables["told"]
-        return changed(tables, told={key: add_to(told.get(key), value) for key, value in keys(size).items()})
+        return change_tables(tables, told={key: add_to(told.get(key), value) for key, value in keys(size).items()})
 
     return change
 
@@ -71,7 +71,7 @@ def key_is_a_place(value: Any) -> bool:
 
 def of_section(section: str, keys: Callable[[float], dict[str, Any]]) -> Change:
     """Change of another section."""
-    return lambda tables, size: changed(tables, **{section: keys(size)})
+    return lambda tables, size: change_tables(tables, **{section: keys(size)})
 
 
 def of_tube(tube: int, size: float) -> tuple[float, ...]:
@@ -79,14 +79,14 @@ def of_tube(tube: int, size: float) -> tuple[float, ...]:
     return tuple(size * (number == tube) for number in range(1, TUBES + 1))
 
 
-def moved(size: float) -> dict[str, Any]:
+def moved_stretch(size: float) -> dict[str, Any]:
     """A stretch of the hole about two stations leans over."""
     return {"moved": {"after_s": MIDDLE_S, "from_m": 5.5, "to_m": 8.5, "north_deg": size}}
 
 
 def in_field(tables: Tables, **keys: dict[str, Any]) -> Tables:
     """The scenario in a rough world that has this out of order and nothing else."""
-    return changed(tables, rough={"samples_hz": 50.0, **keys})
+    return change_tables(tables, rough={"samples_hz": 50.0, **keys})
 
 
 BIAS, MOUNT, JOINT, AXES = ("accelerometer",), ("mount",), ("joint", "north"), ("axes", "accelerometer")
@@ -126,17 +126,17 @@ KINDS: Final[tuple[BlunderKind, ...]] = (
     ),
     BlunderKind(
         "axes exchanged, tube", "", (2.0, 4.0, 8.0),
-        lambda tables, tube: changed(tables, disturbance={"axes-exchanged": {"tube": int(tube)}}), AXES,
+        lambda tables, tube: change_tables(tables, disturbance={"axes-exchanged": {"tube": int(tube)}}), AXES,
     ),
     BlunderKind(
         "axes exchanged in the middle, tube", "", (2.0, 3.0, 5.0),
-        lambda tables, tube: changed(
+        lambda tables, tube: change_tables(
             tables, disturbance={"axes-exchanged": {"tube": int(tube), "after_s": MIDDLE_S}}
         ), AXES,
     ),
     BlunderKind(
         "tubes exchanged in the tally", "mg", (5.0, 20.0, 60.0),
-        lambda tables, mg: changed(tables, disturbance={"calibration-exchanged": {"tubes": (3, 5), "raw_mg": mg}}),
+        lambda tables, mg: change_tables(tables, disturbance={"calibration-exchanged": {"tubes": (3, 5), "raw_mg": mg}}),
         (*BIAS, *MOUNT),
     ),
     BlunderKind(
@@ -153,18 +153,18 @@ KINDS: Final[tuple[BlunderKind, ...]] = (
     ),
     BlunderKind(
         "joints untold", "", (0.0, 1.0, 2.0),
-        lambda tables, _: changed(tables, setup={"untold": ("joints",)}), JOINT,
+        lambda tables, _: change_tables(tables, setup={"untold": ("joints",)}), JOINT,
     ),
     BlunderKind("north wrong", "deg", (1.0, 5.0, 90.0), of_told(lambda deg: {"north_deg": deg}), JOINT),
     BlunderKind(
-        "north untold", "", (0.0, 1.0, 2.0), lambda tables, _: changed(tables, setup={"untold": ("north",)}), JOINT
+        "north untold", "", (0.0, 1.0, 2.0), lambda tables, _: change_tables(tables, setup={"untold": ("north",)}), JOINT
     ),
     BlunderKind(
         "collar wrong", "deg", (0.5, 2.0, 8.0), of_told(lambda deg: {"collar_north_deg": deg}), ("collar",)
     ),
     BlunderKind(
         "collar untold", "", (0.0, 1.0, 2.0),
-        lambda tables, _: changed(tables, setup={"untold": ("collar",)}), ("collar",),
+        lambda tables, _: change_tables(tables, setup={"untold": ("collar",)}), ("collar",),
     ),
     BlunderKind(
         "tube longer", "m", (0.02, 0.1, 0.5),
@@ -177,7 +177,7 @@ KINDS: Final[tuple[BlunderKind, ...]] = (
         of_told(lambda s: {"depth_stuck_after_s": MIDDLE_S, "depth_stuck_s": s}), DEPTH,
     ),
     BlunderKind("depth errs at every stop", "m", (0.01, 0.05, 0.2), of_told(lambda m: {"depth_std_m": m}), DEPTH),
-    BlunderKind("hole moves at two stations", "deg", (0.02, 0.1, 1.0), of_section("path", moved), ("hole",)),
+    BlunderKind("hole moves at two stations", "deg", (0.02, 0.1, 1.0), of_section("path", moved_stretch), ("hole",)),
     BlunderKind(
         "belt slips", "", (1e-4, 1e-3, 1e-2),
         lambda tables, part: in_field(tables, encoder={"belt_slip": part}), ("turn", *JOINT),
@@ -192,7 +192,7 @@ KINDS: Final[tuple[BlunderKind, ...]] = (
     ),
     BlunderKind(
         "more play than stated", "deg", (0.05, 0.2, 1.0),
-        lambda tables, deg: changed(tables, disturbance={"play": {"sigma_deg": deg}}), ("play",),
+        lambda tables, deg: change_tables(tables, disturbance={"play": {"sigma_deg": deg}}), ("play",),
     ),
     BlunderKind(
         "bias of a gyroscope steps", "deg/s", (0.01, 0.1, 1.0),

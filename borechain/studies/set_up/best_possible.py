@@ -70,7 +70,7 @@ class TrueSpread:
 def best_direction_cov(looks: TrueLooks, spread: TrueSpread) -> Array:
     """Covariance (2 s, 2 s), rad^2, of the directions at the stations about two axes across each."""
     stations, tubes = len(looks.tangents), len(spread.turn_cov)
-    bases = across(looks.tangents)
+    bases = axes_across(looks.tangents)
     size = 2 * stations + OF_TUBE * tubes + 1
     information = np.zeros((size, size))
     information[: 2 * stations, : 2 * stations] = np.linalg.inv(spread.path_cov)
@@ -118,7 +118,7 @@ def seen_up(direction: Array, yaw: float, tilt: Array) -> Array:
     return felt + np.cross([tilt[0], tilt[1], 0.0], felt)
 
 
-def across(tangents: Array) -> Array:
+def axes_across(tangents: Array) -> Array:
     """Two unit vectors (s, 2, 3) across each direction."""
     first = np.cross(tangents, [0.0, 1.0, 0.0])
     first /= np.linalg.norm(first, axis=1, keepdims=True)

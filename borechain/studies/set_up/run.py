@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from borechain.studies.drawn_rigs import KnownSetUp, RigDraw, drawn_rigs, rms, tables_of
+from borechain.studies.drawn_rigs import KnownSetUp, RigDraw, drawn_rigs, rms_of, tables_of
 from borechain.studies.heard_ground import heard_ground
 from borechain.studies.judged_hole import (
     AXES,
@@ -130,17 +130,17 @@ def station_row(place: int, runs: Sequence[SetUpRun]) -> dict[str, Any]:
     stated = np.array([math.sqrt(0.5 * np.trace(run.judged.lean_cov[place])) for run in runs])
     best = np.array([run.best_std[place] for run in runs])
     row: dict[str, Any] = {"case": f"station {place + 1}", "md_m": float(np.mean([r.judged.md[place] for r in runs]))}
-    row |= {name: inside(axes[:, axis], INSIDE_1) for axis, name in enumerate(AXES)}
-    row |= {"direction": inside(direction, INSIDE_2), "ellipsoid": inside(ellipsoid, INSIDE_3)}
+    row |= {name: share_inside(axes[:, axis], INSIDE_1) for axis, name in enumerate(AXES)}
+    row |= {"direction": share_inside(direction, INSIDE_2), "ellipsoid": share_inside(ellipsoid, INSIDE_3)}
     row |= {"direction_nees": float(np.mean(direction)) / 2.0, "ellipsoid_nees": float(np.mean(ellipsoid)) / 3.0}
     return row | {
-        "stated_deg": math.degrees(rms(stated)),
-        "best_deg": math.degrees(rms(best)),
-        "ratio": rms(stated / best),
+        "stated_deg": math.degrees(rms_of(stated)),
+        "best_deg": math.degrees(rms_of(best)),
+        "ratio": rms_of(stated / best),
     }
 
 
-def inside(squares: Array, limit: float) -> float:
+def share_inside(squares: Array, limit: float) -> float:
     """Share of squares inside their 95 % limit, %."""
     return 100.0 * float(np.mean(squares <= limit))
 
@@ -156,11 +156,11 @@ def sketch_row(case: SketchCase, runs: Sequence[SetUpRun]) -> dict[str, Any]:
         "case": case.case,
         "faces": case.faces,
         "play_deg": case.play_deg,
-        "toe_mm": 1e3 * rms(toe),
+        "toe_mm": 1e3 * rms_of(toe),
         "toe_stated_mm": 1e3 * math.sqrt(float(np.mean(stated))),
-        "direction_deg": math.degrees(rms(lean)),
-        "direction_stated_deg": math.degrees(rms(stated_deg)),
-        "direction_best_deg": math.degrees(rms(best)),
+        "direction_deg": math.degrees(rms_of(lean)),
+        "direction_stated_deg": math.degrees(rms_of(stated_deg)),
+        "direction_best_deg": math.degrees(rms_of(best)),
     }
 
 
