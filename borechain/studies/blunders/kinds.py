@@ -136,7 +136,7 @@ KINDS: Final[tuple[BlunderKind, ...]] = (
     ),
     BlunderKind(
         "tubes exchanged in the tally", "mg", (5.0, 20.0, 60.0),
-        lambda tables, mg: change_tables(tables, disturbance={"calibration-exchanged": {"tubes": (3, 5), "raw_mg": mg}}),
+        of_section("disturbance", lambda mg: {"calibration-exchanged": {"tubes": (3, 5), "raw_mg": mg}}),
         (*BIAS, *MOUNT),
     ),
     BlunderKind(
@@ -153,18 +153,18 @@ KINDS: Final[tuple[BlunderKind, ...]] = (
     ),
     BlunderKind(
         "joints untold", "", (0.0, 1.0, 2.0),
-        lambda tables, _: change_tables(tables, setup={"untold": ("joints",)}), JOINT,
+        of_section("setup", lambda _: {"untold": ("joints",)}), JOINT,
     ),
     BlunderKind("north wrong", "deg", (1.0, 5.0, 90.0), of_told(lambda deg: {"north_deg": deg}), JOINT),
     BlunderKind(
-        "north untold", "", (0.0, 1.0, 2.0), lambda tables, _: change_tables(tables, setup={"untold": ("north",)}), JOINT
+        "north untold", "", (0.0, 1.0, 2.0), of_section("setup", lambda _: {"untold": ("north",)}), JOINT
     ),
     BlunderKind(
         "collar wrong", "deg", (0.5, 2.0, 8.0), of_told(lambda deg: {"collar_north_deg": deg}), ("collar",)
     ),
     BlunderKind(
         "collar untold", "", (0.0, 1.0, 2.0),
-        lambda tables, _: change_tables(tables, setup={"untold": ("collar",)}), ("collar",),
+        of_section("setup", lambda _: {"untold": ("collar",)}), ("collar",),
     ),
     BlunderKind(
         "tube longer", "m", (0.02, 0.1, 0.5),
@@ -192,7 +192,7 @@ KINDS: Final[tuple[BlunderKind, ...]] = (
     ),
     BlunderKind(
         "more play than stated", "deg", (0.05, 0.2, 1.0),
-        lambda tables, deg: change_tables(tables, disturbance={"play": {"sigma_deg": deg}}), ("play",),
+        of_section("disturbance", lambda deg: {"play": {"sigma_deg": deg}}), ("play",),
     ),
     BlunderKind(
         "bias of a gyroscope steps", "deg/s", (0.01, 0.1, 1.0),

@@ -24,8 +24,8 @@ from sim.world.disturbance.gyroscope import GYROSCOPE
 from sim.world.disturbance.low_pass import LOW_PASS
 from sim.world.disturbance.mount_slip import MOUNT_SLIP
 from sim.world.disturbance.mount_tilt import MOUNT_TILT
-from sim.world.disturbance.tube_play import PLAY
 from sim.world.disturbance.row import Disturbance
+from sim.world.disturbance.tube_play import PLAY
 from sim.world.disturbance.vibration import RECTIFICATION, TORSIONAL, VIBRATION
 from sim.world.disturbance.wander import WANDER
 from sim.world.disturbance.warm_up import WARM_UP
