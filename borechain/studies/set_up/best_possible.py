@@ -22,7 +22,7 @@ from sim.world.world import World
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
 STEP = 1e-5  # rad and m/s^2, of differences
-OF_TUBE = 6  # bias (3), tilt (2), turn
+OF_TUBE = 5  # bias (3) and tilt (2)
 LEAST = 1e-7  # m/s^2 and rad, of what is known
 
 
@@ -32,7 +32,7 @@ class TrueLooks:
 
     Parameters
     ----------
-    station, tube : (n,) places from 0
+    station, tube, top : (n,) places from 0, the last of the topmost tube at that time
     yaw : (n,) rad, true
     yaw_var, force_var : (n,) rad^2 and (m/s^2)^2, of their noise
     tangents : (s, 3), true directions at the stations
@@ -40,6 +40,7 @@ class TrueLooks:
 
     station: Places
     tube: Places
+    top: Places
     yaw: Array
     yaw_var: Array
     force_var: Array
@@ -48,12 +49,12 @@ class TrueLooks:
 
 @dataclass(frozen=True, slots=True)
 class TrueSpread:
-    """What tubes and path were drawn from.
+    """What tubes, marks and path were drawn from.
 
     Parameters
     ----------
     bias_std, tilt_std, play_std : m/s^2, rad and rad
-    turn_cov : (m, m) rad^2, of the turns of the yaws of the tubes
+    mount_std, joint_std, north_std : rad, of the turn of every mount, of every mark, and of the encoder's zero
     path_cov : (2 s, 2 s) rad^2, of the directions at the stations about two axes
     gravity, gravity_std : m/s^2
     """
@@ -61,7 +62,9 @@ class TrueSpread:
     bias_std: float
     tilt_std: float
     play_std: float
-    turn_cov: Array
+    mount_std: float
+    joint_std: float
+    north_std: float
     path_cov: Array
     gravity: float = 9.81
     gravity_std: float = 2e-3
@@ -69,45 +72,48 @@ class TrueSpread:
 
 def best_direction_cov(looks: TrueLooks, spread: TrueSpread) -> Array:
     """Covariance (2 s, 2 s), rad^2, of the directions at the stations about two axes across each."""
-    stations, tubes = len(looks.tangents), len(spread.turn_cov)
+    directions, tubes = 2 * len(looks.tangents), 1 + int(max(looks.tube.max(), looks.top.max()))
+    own = np.tile([*(spread.bias_std,) * 3, *(spread.tilt_std,) * 2], tubes)
+    turns = np.repeat([spread.mount_std, spread.joint_std, spread.joint_std], tubes)
+    stds = np.concatenate([own, turns, [spread.north_std, spread.gravity_std]])
+    information = np.zeros((directions + len(stds),) * 2)
+    information[:directions, :directions] = np.linalg.inv(spread.path_cov)
+    information[directions:, directions:] = np.diag(stds**-2.0)
     bases = axes_across(looks.tangents)
-    size = 2 * stations + OF_TUBE * tubes + 1
-    information = np.zeros((size, size))
-    information[: 2 * stations, : 2 * stations] = np.linalg.inv(spread.path_cov)
-    stds = np.tile([*(spread.bias_std,) * 3, *(spread.tilt_std,) * 2, 1.0], tubes)
-    of_tubes = np.diag(stds**-2.0)
-    turns = np.arange(tubes) * OF_TUBE + OF_TUBE - 1
-    of_tubes[np.ix_(turns, turns)] = np.linalg.inv(spread.turn_cov)
-    information[2 * stations : -1, 2 * stations : -1] = of_tubes
-    information[-1, -1] = spread.gravity_std**-2.0
     for look in range(len(looks.station)):
-        add_look(information, looks, look, bases, spread)
-    return np.asarray(np.linalg.inv(information)[: 2 * stations, : 2 * stations])
+        derivative, noise = look_equations(looks, look, bases, spread, tubes, len(information))
+        information += derivative.T @ np.linalg.solve(noise, derivative)
+    return np.asarray(np.linalg.inv(information)[:directions, :directions])
 
 
-def add_look(information: Array, looks: TrueLooks, look: int, bases: Array, spread: TrueSpread) -> None:
-    """Add what one look tells."""
-    station, tube = int(looks.station[look]), int(looks.tube[look])
-    unknown = np.zeros(2 + OF_TUBE + 1)
+def look_equations(
+    looks: TrueLooks, look: int, bases: Array, spread: TrueSpread, tubes: int, size: int
+) -> tuple[Array, Array]:
+    """How the force (3,) of one look changes with every unknown (3, size), and the covariance (3, 3) of its noise."""
+    station, tube, top = (int(places[look]) for places in (looks.station, looks.tube, looks.top))
 
-    def force(values: Array, yaw_error: float = 0.0, play: Array | None = None) -> Array:
+    def force(values: Array, play: Array) -> Array:
         lean = looks.tangents[station] + values[:2] @ bases[station]
-        tilt = values[5:7] + (0.0 if play is None else play)
-        gravity = spread.gravity + values[-1]
-        return (
-            gravity * seen_up(lean / np.linalg.norm(lean), looks.yaw[look] - values[7] + yaw_error, tilt) + values[2:5]
-        )
+        gravity, yaw = spread.gravity + values[8], looks.yaw[look] - values[7]
+        return gravity * seen_up(lean / np.linalg.norm(lean), yaw, values[5:7] + play) + values[2:5]
 
-    here = force(unknown)
-    by_unknown = np.stack([(force(unknown + STEP * one) - here) / STEP for one in np.eye(len(unknown))], axis=1)
-    by_yaw = (force(unknown, STEP) - here) / STEP
-    by_play = np.stack([(force(unknown, 0.0, STEP * one) - here) / STEP for one in np.eye(2)], axis=1)
-    noise = looks.force_var[look] * np.eye(3) + looks.yaw_var[look] * np.outer(by_yaw, by_yaw)
-    noise += spread.play_std**2 * by_play @ by_play.T
+    nothing, still = np.zeros(9), np.zeros(2)
+    here = force(nothing, still)
+    by_own = np.stack([(force(STEP * one, still) - here) / STEP for one in np.eye(9)], axis=1)
+    by_play = np.stack([(force(nothing, STEP * one) - here) / STEP for one in np.eye(2)], axis=1)
     first = 2 * len(looks.tangents)
-    own = first + OF_TUBE * tube
-    places = np.array([2 * station, 2 * station + 1, *range(own, own + OF_TUBE), len(information) - 1])
-    information[np.ix_(places, places)] += by_unknown.T @ np.linalg.solve(noise, by_unknown)
+    derivative = np.zeros((3, size))
+    derivative[:, 2 * station : 2 * station + 2] = by_own[:, :2]
+    derivative[:, first + OF_TUBE * tube : first + OF_TUBE * (tube + 1)] = by_own[:, 2:7]
+    marks = first + OF_TUBE * tubes
+    # what a yaw is told too large by: the mark at the head and those down to the tube, less mount and north
+    derivative[:, marks + tube] = -by_own[:, 7]
+    derivative[:, marks + tubes + tube + 1 : marks + tubes + top + 1] = by_own[:, 7:8]
+    derivative[:, marks + 2 * tubes + top] = by_own[:, 7]
+    derivative[:, marks + 3 * tubes] = -by_own[:, 7]
+    derivative[:, -1] = by_own[:, 8]
+    noise = looks.force_var[look] * np.eye(3) + looks.yaw_var[look] * np.outer(by_own[:, 7], by_own[:, 7])
+    return derivative, noise + spread.play_std**2 * by_play @ by_play.T
 
 
 def seen_up(direction: Array, yaw: float, tilt: Array) -> Array:
@@ -150,6 +156,7 @@ def best_of_rig(world: World, hole: SurveyedHole, config: GroundConfig, known: K
     looks = TrueLooks(
         place.astype(np.intp),
         tubes - 1,
+        world.motion.tops(at) - 1,
         np.array([world.yaw_truth(one, t) for one, t in zip(tubes.tolist(), at.tolist(), strict=True)]),
         yaw_var,
         np.full(len(rows), float(np.mean(force_var))),
@@ -166,7 +173,9 @@ def best_of_rig(world: World, hole: SurveyedHole, config: GroundConfig, known: K
         max(known.bias_mg * 1e-3 * gravity, LEAST),
         max(math.radians(known.tilt_deg), LEAST),
         math.radians(known.play_deg),
-        turn_covariance(world.scenario.tubes, known),
+        math.radians(known.mount_deg),
+        math.radians(known.joint_deg),
+        math.radians(known.north_deg),
         path,
         gravity,
     )
@@ -183,12 +192,3 @@ def look_rows(station: SurveyStation) -> list[tuple[float, ...]]:
 def at_station(world: World, rows: list[tuple[float, ...]], place: int) -> list[float]:
     """True depths (m) of the readings at one station."""
     return [world.bit_depth(row[2]) - world.below(int(row[1])) for row in rows if row[0] == place]
-
-
-def turn_covariance(tubes: int, known: KnownSetUp) -> Array:
-    """Covariance (m, m), rad^2, of the yaws of tubes: mounts, joints that add up from the top down, north."""
-    mounts = math.radians(known.mount_deg) ** 2 * np.eye(tubes)
-    numbers = np.arange(tubes)
-    above = tubes - np.maximum(numbers[:, None], numbers)  # joints that two tubes have above them both
-    joints = math.radians(known.joint_deg) ** 2 * above
-    return np.asarray(mounts + joints + math.radians(known.north_deg) ** 2)
