@@ -28,6 +28,7 @@ COMMANDS = {
     "query": ("borechain.cli.ground.query", "query", "Ask a running ground station."),
     "watch": ("borechain.cli.ground.query", "watch", "Follow what a running ground station publishes."),
     "crew": ("borechain.cli.ground.crew", "crew", "Show a running rig to its crew, on a screen of 80 x 24."),
+    "check": ("borechain.cli.ground.check_command", "check", "Say whether a rig is ready to drill."),
     "record": (
         "borechain.cli.ground.record_command",
         "record",

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
 
 from groundstation.errors import ConfigurationError
 from groundstation.survey.fusion.fusion import Weighting
-from groundstation.survey.fusion.resolve import Direction, known_direction
 from groundstation.survey.wall.column_deviation import PRESETS, ColumnDesign
 from telemetry import keys
 
 SENSOR_BIAS_DEG = 0.06  # of an uncalibrated accelerometer, as a tilt: 1 mg
 Positive = Annotated[float, Field(gt=0.0)]
+Joint = Annotated[str, Field(pattern=r"^([1-9][0-9]{0,2}|drive)-[1-9][0-9]{0,2}$")]  # upper tube and lower, such as 4-3
 
 
 class GroundConfig(BaseModel):
@@ -39,9 +38,21 @@ class GroundConfig(BaseModel):
     string_transport: Literal["shortest", "parallel"] = Field(
         "shortest", description="yaw of a tube in a bent hole: that of the head, or as a shaft without twist carries it"
     )
-    collar_inclination_deg: float = Field(0.0, ge=0.0, lt=180.0, description="of the hole at the collar")
-    collar_azimuth_deg: float = 0.0
-    collar_std_deg: float = Field(0.0, ge=0.0, description="of the direction at the collar, each way")
+    north_deg: float = Field(0.0, description="of the encoder's zero, from site north, clockwise")
+    north_std_deg: Positive | None = Field(None, description="of it; not told if absent: any azimuth may be")
+    collar_inclination_deg: float | None = Field(
+        None, ge=0.0, lt=180.0, description="of the hole at the collar; as the design if absent"
+    )
+    collar_azimuth_deg: float | None = None
+    collar_std_deg: Positive | None = Field(None, description="of the direction at the collar, each way")
+    joints: tuple[tuple[Joint, float, Positive], ...] = Field(
+        (), description="joint, angle and standard error (deg) of those that the nodes were not told"
+    )
+    stick_up_m: float = Field(0.0, description="of the zero of the depth over the collar")
+    stick_up_std_m: Positive | None = None
+    mount_tilt_std_deg: Positive | None = Field(
+        None, description="of an IMU against its tube's axis until it is aligned; as mounted, 0.5, if absent"
+    )
     weighting: Weighting = Field(Weighting.BAYES, description="how the readings of one station count")
     target: Positive = Field(30.0, description="m, length of the design axis")
     design_inclination_deg: float = Field(0.0, ge=0.0, le=180.0)
@@ -67,15 +78,18 @@ class GroundConfig(BaseModel):
         """Database to use."""
         return self.database_url or f"sqlite:///{self.folder / 'ground.sqlite'}"
 
-    @property
-    def collar(self) -> Direction:
-        """Direction of the hole at the collar, known as well as is stated."""
-        inclination, azimuth = math.radians(self.collar_inclination_deg), math.radians(self.collar_azimuth_deg)
-        along = np.array([math.cos(azimuth), math.sin(azimuth)])
-        across = np.array([-along[1], along[0]])
-        lean_cov = math.cos(inclination) ** 2 * np.outer(along, along) + np.outer(across, across)
-        var = math.radians(self.collar_std_deg) ** 2
-        return replace(known_direction(inclination, azimuth), cov=var * lean_cov)
+    @model_validator(mode="after")
+    def _check_told(self) -> Self:
+        """What is told is told with its standard error: without one it would be taken for exact."""
+        told = {
+            "north_std_deg": self.north_deg != 0.0,
+            "collar_std_deg": self.collar_inclination_deg is not None or self.collar_azimuth_deg is not None,
+            "stick_up_std_m": self.stick_up_m != 0.0,
+        }
+        for name, is_told in told.items():
+            if is_told and getattr(self, name) is None:
+                raise PydanticCustomError("told", "expected {name} beside the value that it is of", {"name": name})
+        return self
 
     @property
     def design(self) -> ColumnDesign:
@@ -102,5 +116,7 @@ def checked_config(**settings: Any) -> GroundConfig:
         return GroundConfig(**settings)
     except ValidationError as error:
         first = error.errors()[0]
+        if not first["loc"]:
+            raise ConfigurationError(first["msg"]) from error
         name = ".".join(str(part) for part in first["loc"])
         raise ConfigurationError(f"{name}: {first['msg']}, got {first['input']!r:.60}") from error

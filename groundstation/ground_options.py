@@ -29,9 +29,15 @@ class GroundRequest:
     tolerance: str
     steering_deg_per_m: float
     string_transport: str
-    collar_inclination_deg: float
-    collar_azimuth_deg: float
-    collar_std_deg: float
+    north_deg: float
+    north_std_deg: float | None
+    collar_inclination_deg: float | None
+    collar_azimuth_deg: float | None
+    collar_std_deg: float | None
+    joints: tuple[tuple[str, float, float], ...]
+    stick_up_m: float
+    stick_up_std_m: float | None
+    mount_tilt_std_deg: float | None
     weighting: str
     accelerometer_bias_std_deg: float
     mount_std_deg: float
@@ -50,6 +56,12 @@ class GroundRequest:
             "tolerance": self.tolerance,
             "steering_deg_per_m": self.steering_deg_per_m,
             "string_transport": self.string_transport,
+            "north_deg": self.north_deg,
+            "north_std_deg": self.north_std_deg,
+            "joints": self.joints,
+            "stick_up_m": self.stick_up_m,
+            "stick_up_std_m": self.stick_up_std_m,
+            "mount_tilt_std_deg": self.mount_tilt_std_deg,
             "collar_inclination_deg": self.collar_inclination_deg,
             "collar_azimuth_deg": self.collar_azimuth_deg,
             "collar_std_deg": self.collar_std_deg,
@@ -98,19 +110,40 @@ ground_options = gather_options(
         help="Yaw of a tube in a bent hole: that of the head, or as a shaft without twist carries it along.",
     ),
     click.option(
+        "--north-deg",
+        type=float,
+        default=0.0,
+        show_default=True,
+        help="Where the encoder's zero points, from site north, clockwise.",
+    ),
+    click.option(
+        "--north-std-deg", type=POSITIVE, help="Standard error of --north-deg. Without it no azimuth is known."
+    ),
+    click.option(
         "--collar-inclination-deg",
         type=click.FloatRange(0.0, 180.0, max_open=True),
-        default=0.0,
-        show_default=True,
-        help="Of the hole at the collar, where the head holds the string.",
+        help="Of the hole at the collar, where the head holds the string  [default: as the design]",
     ),
-    click.option("--collar-azimuth-deg", type=float, default=0.0, show_default=True, help="Of the hole at the collar."),
+    click.option("--collar-azimuth-deg", type=float, help="Of the hole at the collar  [default: as the design]"),
     click.option(
         "--collar-std-deg",
-        type=click.FloatRange(0.0),
-        default=0.0,
-        show_default=True,
-        help="Standard error of the direction at the collar, each way.",
+        type=POSITIVE,
+        help="Standard error of the direction at the collar, each way. Not told it is 1.",
+    ),
+    click.option(
+        "--joint",
+        "joints",
+        type=(str, float, float),
+        multiple=True,
+        metavar="JOINT ANGLE STD",
+        help="Angle and standard error (deg) of a joint that no node was told: 4-3 12.5 0.05, or drive-4. Repeatable.",
+    ),
+    click.option("--stick-up-m", type=float, default=0.0, show_default=True, help="Zero of the depth over the collar."),
+    click.option("--stick-up-std-m", type=POSITIVE, help="Standard error of --stick-up-m. Not told it is 0.1."),
+    click.option(
+        "--mount-tilt-std-deg",
+        type=POSITIVE,
+        help="Standard error of an IMU's mounting against its tube's axis, until it is aligned. Not told it is 0.5.",
     ),
     click.option(
         "--weighting",

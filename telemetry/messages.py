@@ -29,6 +29,7 @@ EPOCH_UNKNOWN = 0
 CONTENT_SIZE = 16  # bytes of the hash that a receipt names
 SEGMENT_SIZE = 192  # bytes of a block in one message; eight such messages and their frame stay below 4 KiB
 MAX_SEGMENTS = 32
+UNKNOWN_YAW_STD = math.pi / math.sqrt(3.0)  # rad, of a yaw that may be any: uniform on the circle
 
 
 def address_name(address: int) -> str:
@@ -77,6 +78,8 @@ class NodeFlag(enum.IntFlag):
     BIAS_UNKNOWN = 64
     SENSOR_FAULT = 128  # a sensor is faulty, or has not yet proved itself again
     NOT_SAVED = 256  # the node's disk refuses: a cut now loses what came since
+    DRIVE_UNTOLD = 512  # it hangs from the drive head by a joint whose angle it was not told
+    LOWER_UNTOLD = 1024  # nor was it told the angle of the joint to the tube below
 
 
 class UploadPhase(enum.IntEnum):

@@ -16,6 +16,7 @@ from borechain.client import Ground, connect_to_ground
 from borechain.crew import screen_panels
 from borechain.crew.app import CrewApp
 from borechain.crew.picture import Picture, View
+from borechain.crew.setup_panel import parse_order
 
 pytestmark = pytest.mark.slow
 
@@ -236,7 +237,15 @@ def test_an_answer_is_missed_that_is_of_before_its_path_changed_or_of_a_former_s
     def at(revision: int, minute: int, **more: Any) -> dict[str, Any]:
         return {"revision": revision, "utc": f"2026-01-01T00:{minute:02d}:00+00:00"} | more
 
-    known = picture(status=at(7, 5), verdict=at(3, 1), string=at(9, 2), column=at(9, 8), wall=at(2, 2), alarms=at(1, 4))
+    known = picture(
+        status=at(7, 5),
+        verdict=at(3, 1),
+        string=at(9, 2),
+        column=at(9, 8),
+        wall=at(2, 2),
+        alarms=at(1, 4),
+        setup=at(1, 4),
+    )
     assert known.missed == []
     rows = [
         {"path": "status", "changed_at": 7},
@@ -246,3 +255,60 @@ def test_an_answer_is_missed_that_is_of_before_its_path_changed_or_of_a_former_s
     known.on_answer("changes", at(8, 6, changes=rows), 1.0)
     # of the two that are newer than the word of the changes one came after it, the other is of a former start
     assert known.missed == ["string", "alarms", "orders"]
+
+
+@pytest.mark.parametrize(
+    ("line", "name", "parameters"),
+    [
+        ("north action=tell angle_deg=12", "north", {"action": "tell", "angle_deg": "12"}),
+        ("  accept_joints action=confirm ", "accept_joints", {"action": "confirm"}),
+        ("take_survey tube=3", "take_survey", {"tube": "3"}),
+    ],
+)  # fmt: skip
+def test_an_order_is_typed_as_its_name_and_its_parameters(line: str, name: str, parameters: dict[str, str]) -> None:
+    assert parse_order(line) == (name, parameters)
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("", "expected the name of an order, such as north"),
+        ("north 12", "north: expected parameters as name=value, got 12"),
+        ("north =12", "north: expected parameters as name=value, got =12"),
+    ],
+)
+def test_a_line_that_is_no_order_is_told(line: str, expected: str) -> None:
+    with pytest.raises(ValueError, match=expected):
+        parse_order(line)
+
+
+async def test_north_is_missed_on_the_setup_panel_told_in_a_line_and_taken_back(tmp_path: Path) -> None:
+    """The five-second task: which item costs most at the toe, and what is to be done next."""
+    rig = Rig(tmp_path, target=20.0, north_std_deg=None, mount_tilt_std_deg=None)
+    rig.run(5.0)
+    for stop in range(1, 4):
+        rig.drill(stop, 0.3)
+    with serving(rig) as served, connect_to_ground(served.endpoint, timeout=10.0) as ground:
+        app = CrewApp(ground, "rig-1", "anna", Clock())
+        async with app.run_test(size=SIZE) as pilot:
+            await until(app, served, lambda text: "DON'T KNOW: not told: north" in text, speaks_of(3))
+            await pilot.press("u")
+            text = await until(app, served, lambda text: "NOT READY TO DRILL" in text, speaks_of(3))
+            lines = [line.rstrip() for line in text.splitlines()]
+            assert len(lines) <= SIZE[1]
+            assert "NOT READY TO DRILL, not told: north" in lines
+            assert "next: tell north: cmd/north?action=tell;angle_deg=..;sigma_deg=.." in lines
+            head = next(place for place, line in enumerate(lines) if line.startswith("item"))
+            assert lines[head + 1].split()[:4] == ["north", "3.7", "any", "104"]
+            await pilot.press("o", *"north action=tell angle_deg=12.5 sigma_deg=0.3", "enter")
+            text = await until(app, served, lambda text: "\nREADY TO DRILL" in text, speaks_of(3))
+            assert "next: align tube 3 in slow turns: cmd/align?tube=3" in text
+            await pilot.press("o", *"setup action=undo", "enter")
+            await until(app, served, lambda text: "NOT READY TO DRILL, not told: north" in text, speaks_of(3))
+            await pilot.press("o", *"what", "escape", "u")
+            await until(app, served, lambda text: "of the tolerance" in text, speaks_of(3))
+
+
+def speaks_of(tubes: int) -> Callable[[Rig], None]:
+    """A rig of so many tubes that speaks as it does all the time."""
+    return lambda rig: rig.speak(tubes)

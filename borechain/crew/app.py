@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import queue
 import time
 from collections.abc import Callable, Sequence
@@ -10,11 +11,12 @@ from typing import Any, ClassVar, Protocol
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
-from textual.widgets import Static
+from textual.widgets import Input, Static
 
 from borechain.client import ClientError
 from borechain.crew import screen_panels
 from borechain.crew.picture import PATHS, Picture, View
+from borechain.crew.setup_panel import parse_order, setup_panel
 from telemetry.errors import BorechainError
 
 REFRESH = 0.25  # s
@@ -53,18 +55,23 @@ class CrewApp(App[None]):
     #verdict { height: 3; margin-bottom: 1; }
     #middle { height: 11; }
     #plan { width: 23; } #strip { width: 27; padding-left: 1; } #string { width: 30; padding-left: 1; }
+    #setup { height: 11; display: none; }
     #alarms { height: 5; } #actions { height: 2; }
+    #order { height: 1; border: none; padding: 0; display: none; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("a", "acknowledge", "acknowledge"),
         Binding("s", "shelve", "shelve"),
         Binding("t", "take_survey", "take survey"),
         Binding("d", "accept_depth", "accept depth"),
+        Binding("u", "show_setup", "setup"),
+        Binding("o", "type_order", "order"),
+        Binding("escape", "leave_order", "leave the order", show=False),
         Binding("down", "choose(1)", "next alarm"),
         Binding("up", "choose(-1)", "previous alarm"),
         Binding("q", "quit", "quit"),
     ]
-    HELP = "[a]cknowledge [s]helve 30 min [t]ake survey accept [d]epth up/down alarm [q]uit"
+    HELP = "[a]cknowledge [s]helve [t]ake survey accept [d]epth set[u]p [o]rder [q]uit"
 
     def __init__(
         self,
@@ -93,8 +100,12 @@ class CrewApp(App[None]):
             yield Static(id="plan")
             yield Static(id="strip")
             yield Static(id="string")
+        yield Static(id="setup")
         yield Static(id="alarms")
         yield Static(id="actions")
+        yield Input(
+            placeholder="order, such as: north action=tell angle_deg=12 sigma_deg=0.3", id="order", disabled=True
+        )
         yield Static(screen_panels.fit_line(self.HELP, screen_panels.QUIET), id="help")
 
     def on_mount(self) -> None:
@@ -123,6 +134,7 @@ class CrewApp(App[None]):
             ("plan", screen_panels.plan_panel(picture)),
             ("strip", screen_panels.strip_panel(picture)),
             ("string", screen_panels.string_panel(picture)),
+            ("setup", setup_panel(picture, datetime.datetime.now(datetime.UTC))),
             ("alarms", screen_panels.alarms_panel(picture, self._chosen, ALARM_ROWS)),
             ("actions", screen_panels.actions_panel(picture, ACTION_ROWS)),
         ):
@@ -161,6 +173,38 @@ class CrewApp(App[None]):
     def action_accept_depth(self) -> None:
         """Believe the depth that comes now; the crew has measured it."""
         self._order("accept_depth", "accept depth", action="confirm")
+
+    def action_show_setup(self) -> None:
+        """Show the setup in place of plan, strip and string, or those again."""
+        panel, middle = self.query_one("#setup"), self.query_one("#middle")
+        middle.display, panel.display = panel.display, middle.display
+
+    def action_type_order(self) -> None:
+        """Have an order typed in the last line."""
+        self._open_order(is_open=True)
+        self.query_one("#order", Input).focus()
+
+    def action_leave_order(self) -> None:
+        """Close the line without an order."""
+        self._open_order(is_open=False)
+
+    def on_input_submitted(self, typed: Input.Submitted) -> None:
+        """Carry the typed order out."""
+        self._open_order(is_open=False)
+        try:
+            name, parameters = parse_order(typed.value)
+        except ValueError as error:
+            self._tell(str(error))
+            return
+        self._order(name, typed.value.strip(), **parameters)
+
+    def _open_order(self, *, is_open: bool) -> None:
+        line = self.query_one("#order", Input)
+        line.display, self.query_one("#help").display = is_open, not is_open
+        line.disabled = not is_open  # keys are those of the screen else
+        line.clear()
+        if not is_open:
+            self.set_focus(None)
 
     def _order_about_alarm(self, action: str, **more: object) -> None:
         alarms = self.picture.alarms

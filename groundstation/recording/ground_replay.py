@@ -13,10 +13,12 @@ from groundstation.errors import GroundError
 from groundstation.recording.recording_file import Recording, RecordingError
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import BEGIN, DEPTH, MESSAGE, ORDER, Intake, IntakeError, unpack_intake
+from groundstation.service.process.operator_access import SETUP_COMMANDS
 from telemetry import keys
 from telemetry.errors import BorechainError
 
-REPEATED_ORDERS = ("accept_depth", "accept_joints", "alarm")  # of the ground station, which need no key of the rig
+# of the ground station, which need no key of the rig
+REPEATED_ORDERS = ("accept_depth", "accept_joints", "alarm", *SETUP_COMMANDS)
 
 
 @dataclass(slots=True)

@@ -9,7 +9,7 @@ import numpy as np
 from node.firmware.alignment_orders import angles_of
 from node.firmware.inputs import RigContext
 from node.firmware.pending_event import PendingEvent
-from node.firmware.tube_settings import TubeSettings
+from node.firmware.tube_settings import TubeSettings, bounded_by_circle
 from node.kernels.arithmetic.angles import from_binary, wrap_angle
 from node.kernels.arithmetic.formats import DEG, Array
 from node.kernels.record.filter_record import Err
@@ -31,6 +31,7 @@ SENSOR_FAULT, YAW_UNTRUSTED = int(NodeFlag.SENSOR_FAULT), int(NodeFlag.YAW_UNTRU
 AIDING_OLD, INNOVATION_REJECTED = int(NodeFlag.AIDING_OLD), int(NodeFlag.INNOVATION_REJECTED)
 RATE_EXCEEDED, RESTORED = int(NodeFlag.RATE_EXCEEDED), int(NodeFlag.RESTORED)
 CLOCK_UNSYNCHRONISED, BIAS_UNKNOWN = int(NodeFlag.CLOCK_UNSYNCHRONISED), int(NodeFlag.BIAS_UNKNOWN)
+DRIVE_UNTOLD, LOWER_UNTOLD = int(NodeFlag.DRIVE_UNTOLD), int(NodeFlag.LOWER_UNTOLD)
 STATIC_BIAS = int(NodeMode.STATIC_BIAS)
 VAR_FLOOR = (0.001 * DEG) ** 2
 VAR_CEILING = 100.0  # rad^2, the largest that a message says; a yaw of that variance is any yaw
@@ -55,6 +56,9 @@ class NodeReporter:
         self._next_sequence = next_sequence
         self._restored = restored
         self._surveyed: SurveyMeasurement | None = None  # as it was said last
+        has_tube_below = settings.tube > 1  # tubes are numbered from the lowest up
+        self._below = LOWER_UNTOLD if has_tube_below and not settings.lower_joint.is_told else 0
+        self._on_top = 0 if settings.drive_joint.is_told else DRIVE_UNTOLD  # it says so while it hangs from the drive
 
     @property
     def sensor_flags(self) -> NodeFlag:
@@ -86,7 +90,9 @@ class NodeReporter:
 
     def flags(self, context: RigContext, now: float) -> NodeFlag:
         """What the node says of the trust in its own yaw at ``now`` (s, own clock)."""
-        state, bits = self._state, self._sensor_bits()
+        state, bits = self._state, self._sensor_bits() | self._below
+        if context.hops == 1:
+            bits |= self._on_top
         if not state["yaw_known"]:
             bits |= YAW_UNTRUSTED
         if now - state["last_aided"] > self._settings.aiding_old_after:
@@ -163,7 +169,7 @@ class NodeReporter:
         return Aiding(
             yaw=self.yaw,
             yaw_var=self.yaw_var,
-            systematic_var=float(self._state["systematic_var"]) + below.std**2,
+            systematic_var=bounded_by_circle(float(self._state["systematic_var"]) + below.std**2),
             offset=wrap_angle(below.angle),
             rate=float(self._state["now_rate"]),
             valid_at=context.rig_now,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from node.firmware.tube_settings import MakeUpAngle, PassedTube
+from node.firmware.tube_settings import MakeUpAngle, PassedTube, bounded_by_circle
 from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.string.twist import reaching_var
 from telemetry.frozen import replace
@@ -27,7 +27,7 @@ def aiding_across_silent(aiding: Aiding, silent: Sequence[PassedTube], stiffness
         aiding = replace(
             aiding,
             offset=wrap_angle(wrap_angle(aiding.offset + drive.angle) + tube.lower_joint.angle),
-            systematic_var=aiding.systematic_var + drive.std**2 + tube.lower_joint.std**2,
+            systematic_var=bounded_by_circle(aiding.systematic_var + drive.std**2 + tube.lower_joint.std**2),
             torsion_var=float(reaching_var(aiding.torsion_var, aiding.torque, stiffness)),
             hops=aiding.hops + 1,
         )

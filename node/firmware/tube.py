@@ -15,7 +15,7 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.kernel_choice import kernel_of
 from node.firmware.reporter import NodeReporter
 from node.firmware.static_record import begin_record, static_record
-from node.firmware.tube_settings import TubeSettings, settings_record
+from node.firmware.tube_settings import TubeSettings, bounded_by_circle, settings_record
 from node.kernels.arithmetic.formats import DEG, Array
 from node.kernels.arithmetic.quantity import NONE
 from node.kernels.filter.modes import STATIC_BIAS
@@ -126,7 +126,7 @@ class Tube:
         return Aiding(
             a.yaw,
             a.yaw_var,
-            float(systematic_var[0]),
+            bounded_by_circle(float(systematic_var[0])),
             float(offset[0]),
             a.rate,
             a.valid_at,

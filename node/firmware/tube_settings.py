@@ -16,7 +16,7 @@ from node.kernels.arithmetic.formats import DEG, Array
 from node.kernels.record.filter_record import Scheme
 from node.kernels.record.node_record import SETTINGS
 from node.kernels.record.sensor_record import MAX_IMUS
-from telemetry.messages import MAX_TUBE
+from telemetry.messages import MAX_TUBE, UNKNOWN_YAW_STD
 
 Kernel: TypeAlias = Literal["float64", "fixed"]
 KERNELS: Final = get_args(Kernel)
@@ -31,6 +31,14 @@ class MakeUpAngle:
 
     angle: float = 0.0  # rad
     std: float = 0.0  # rad, constant error of the reading
+
+    @property
+    def is_told(self) -> bool:
+        """Whether anything was read from the marks: below the joint a yaw is known."""
+        return self.std < UNKNOWN_YAW_STD
+
+
+UNTOLD: Final = MakeUpAngle(0.0, UNKNOWN_YAW_STD)  # below a joint whose angle is not told the yaw may be any
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +112,14 @@ class TubeSettings:
             ("lower_joint.angle", self.lower_joint.angle),
         ):
             require_setting(math.isfinite(angle), f"{name}: expected an angle in rad, got {angle}")
+
+
+def bounded_by_circle(variance: float) -> float:
+    """A systematic variance (rad^2) as it is handed down: of any number of angles that may be any it is that of one.
+
+    Without the bound thirty joints that were not told would be more than a message says.
+    """
+    return min(variance, UNKNOWN_YAW_STD**2)
 
 
 def require_setting(condition: bool, message: str) -> None:

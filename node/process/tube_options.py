@@ -25,7 +25,7 @@ from telemetry.runtime.process_options import (
 from telemetry.runtime.typed_options import gather_options
 
 if TYPE_CHECKING:
-    from node.firmware.tube_settings import TubeSettings
+    from node.firmware.tube_settings import MakeUpAngle, TubeSettings
 
 FILE = click.Path(path_type=Path, dir_okay=False)
 SCHEMES = ("forward", "estimate", "intersection")
@@ -36,8 +36,8 @@ class TubeRequest:
     """A tube as its options say; ``imus`` are its IMUs."""
 
     tube: int
-    drive_joint_deg: float
-    lower_joint_deg: float
+    drive_joint_deg: float | None
+    lower_joint_deg: float | None
     joint_std_deg: float
     mount_std_deg: float
     kernel: Literal["float64", "fixed"]
@@ -55,14 +55,13 @@ class TubeRequest:
         NodeConfigurationError, CalibrationError
             When a setting is outside its range, or a file is not a calibration.
         """
-        from node.firmware.tube_settings import MakeUpAngle, TubeSettings
+        from node.firmware.tube_settings import TubeSettings
         from node.kernels.record.filter_record import Scheme
 
-        joint_std = math.radians(self.joint_std_deg)
         return TubeSettings(
             tube=self.tube,
-            drive_joint=MakeUpAngle(math.radians(self.drive_joint_deg), joint_std),
-            lower_joint=MakeUpAngle(math.radians(self.lower_joint_deg), joint_std),
+            drive_joint=self._angle_of(self.drive_joint_deg),
+            lower_joint=self._angle_of(self.lower_joint_deg),
             mount_std=math.radians(self.mount_std_deg),
             scheme=Scheme[self.scheme.upper()],
             kernel=self.kernel,
@@ -72,17 +71,24 @@ class TubeRequest:
             imus=self.imus.to_settings(),
         )
 
+    def _angle_of(self, read_deg: float | None) -> MakeUpAngle:
+        """Angle of a joint as it was read, or one that may be any where it was not."""
+        from node.firmware.tube_settings import UNTOLD, MakeUpAngle
+
+        return UNTOLD if read_deg is None else MakeUpAngle(math.radians(read_deg), math.radians(self.joint_std_deg))
+
 
 tube_options = gather_options(
     click.option("--tube", type=int, required=True, help="Number of the tube, 1 is the lowest."),
     click.option(
-        "--drive-joint-deg", type=float, default=0.0, help="Angle read from the scribe marks, drive head to this tube."
+        "--drive-joint-deg",
+        type=float,
+        help="Angle read from the scribe marks, drive head to this tube. Without it the yaw below may be any.",
     ),
     click.option(
         "--lower-joint-deg",
         type=float,
-        default=0.0,
-        help="Angle read from the scribe marks, this tube to the one below.",
+        help="Angle read from the scribe marks, this tube to the one below. Without it the yaw below may be any.",
     ),
     click.option(
         "--joint-std-deg", type=float, default=0.05, show_default=True, help="Standard error of such a reading."

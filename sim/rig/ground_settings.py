@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from sim.world.scenario_file import EXACTLY_DEG
+
 if TYPE_CHECKING:
     from sim.world.world import World
 
@@ -12,6 +14,7 @@ if TYPE_CHECKING:
 def ground_settings(world: World) -> dict[str, Any]:
     """What the operator enters at the ground station: tally, design, and what calibration left."""
     file = world.scenario.file
+    transport = {} if file.rough is None else {"string_transport": file.rough.string.transport}
     return {
         "tube_length": world.scenario.tube_length,
         "gravity": file.accelerometer.gravity_mps2,
@@ -22,17 +25,20 @@ def ground_settings(world: World) -> dict[str, Any]:
         "design_azimuth_deg": file.design.azimuth_deg,
         "column_radius": file.design.radius_m,
         "tolerance": file.design.tolerance,
-    } | transport_settings(world)
+    } | (transport | told_settings(world))
 
 
-def transport_settings(world: World) -> dict[str, Any]:
-    """What the operator enters where the string turns in a bent hole: that it does, and how the hole begins."""
-    rough = world.scenario.file.rough
-    if rough is None or rough.string.transport == "shortest":
-        return {}
+def told_settings(world: World) -> dict[str, Any]:
+    """What the crew tells of the rig: it knows the truth as well as it states, but for what it does not tell."""
+    told = world.scenario.file.setup
     inclination, azimuth = world.scenario.hole.direction(0.0)
-    return {
-        "string_transport": rough.string.transport,
-        "collar_inclination_deg": math.degrees(inclination),
-        "collar_azimuth_deg": math.degrees(azimuth),
+    by_name = {
+        "north": {"north_std_deg": told.north_std_deg},
+        "collar": {
+            "collar_inclination_deg": math.degrees(inclination),
+            "collar_azimuth_deg": math.degrees(azimuth),
+            "collar_std_deg": told.collar_std_deg,
+        },
+        "mounts": {"mount_tilt_std_deg": max(world.scenario.file.joints.mount_tilt_std_deg, EXACTLY_DEG)},
     }
+    return {key: value for name, told_ in by_name.items() if name not in told.untold for key, value in told_.items()}

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from node.firmware.tube_settings import MakeUpAngle, PassedTube
+from node.firmware.tube_settings import UNTOLD, MakeUpAngle, PassedTube
 from sim.world.motion import Motion
 from sim.world.random_streams import RandomStream, random_stream
 from sim.world.scenario import Scenario
@@ -33,12 +33,15 @@ class Marks:
 
     def __init__(self, scenario: Scenario, seed: int, motion: Motion) -> None:
         self._tubes, self._rig = scenario.tubes, scenario.file.rig
-        self._section, self._rough, self._wrong = scenario.file.joints, scenario.file.rough, scenario.file.told
+        self._section, self._rough = scenario.file.joints, scenario.file.rough
+        self._told, self._wrong = scenario.file.setup, scenario.file.told
         self._seed = seed
         self.made_up = motion.make_ups if self._rig.tubes_at_start else motion.make_ups[1:]
 
     def read(self, tube: int) -> PassedTube:
         """What the crew reads from the scribe marks of a tube."""
+        if "joints" in self._told.untold:
+            return PassedTube(UNTOLD, UNTOLD)
         std = math.radians(self._section.reading_std_deg)
         drive, lower = self._joint_angles
         drive_error, lower_error = self._joint_errors

@@ -21,6 +21,7 @@ from sim.world.told_section import ToldSection
 from telemetry.messages import MAX_TUBE
 
 VERSION = 1  # of the format
+EXACTLY_DEG = 1e-12  # stated of what a world has no error in: a standard error of zero is refused
 
 
 class RigSection(ScenarioSection):
@@ -78,6 +79,16 @@ class JointSection(ScenarioSection):
     )
     unseen_std_deg: NotNegative = Field(0.0, description="what the string below turns unseen at each make-up")
     head_turn_deg: NotNegative = Field(0.0, description="about how far the head turns, free of the string, at each")
+
+
+class SetupSection(ScenarioSection):
+    """What the crew tells of the rig, each with the standard error that it states."""
+
+    untold: tuple[Literal["north", "collar", "joints", "mounts"], ...] = Field(
+        (), description="what the crew does not tell, of north, collar, joints and mounts"
+    )
+    north_std_deg: Positive = Field(EXACTLY_DEG, description="stated of the encoder's zero against north")
+    collar_std_deg: Positive = Field(EXACTLY_DEG, description="stated of the direction at the collar, each way")
 
 
 class TorsionSection(ScenarioSection):
@@ -270,6 +281,7 @@ class ScenarioFile(ScenarioSection):
     schedule: ScheduleSection = ScheduleSection()
     rotation: RotationSection = RotationSection()
     joints: JointSection = JointSection()
+    setup: SetupSection = SetupSection()
     torsion: TorsionSection | None = None
     gyroscope: GyroSection = GyroSection()
     accelerometer: AccelerometerSection = AccelerometerSection()

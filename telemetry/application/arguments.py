@@ -21,7 +21,7 @@ from telemetry.quantities import (
     check_text,
 )
 
-SUFFIXES = {"rad": "_deg", "s": "_s"}  # how an operator reads a unit in a name
+SUFFIXES = {"rad": "_deg", "s": "_s", "m": "_m"}  # how an operator reads a unit in a name
 NAMED_BY_UNIT = ("seconds",)
 ROUTE = ("tube", "action", "by")  # parameters of every command
 SHORT = 40  # characters of a wrong value that an error repeats

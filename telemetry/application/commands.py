@@ -20,6 +20,7 @@ from telemetry.schema import U53
 
 SHORTEST_RECORD, LONGEST_RECORD = 5.0, 3600.0  # s
 FEWEST_TURNS, MOST_TURNS = 1.0, 20.0
+FINEST_DEG = 1e-4  # standard deviation of an angle that can be told; a sigma of zero is none
 SHELVED_AT_MOST = 720.0  # min, a shift
 STAGES = ("synchronise", "start", "aiding", "frame", "read", "filter", "report", "save", "send", "cycle")
 
@@ -66,6 +67,10 @@ def _result(name: str, kind: ValueKind, meaning: str, unit: str = "") -> Quantit
     return Quantity(name, kind, meaning, unit)
 
 
+def _angle(name: str, meaning: str, most: float) -> Argument:
+    return _argument(name, ValueKind.NUMBER, meaning, unit="rad", low=-most, high=most, needed=True)
+
+
 NUMBER, INTEGER, TEXT = ValueKind.NUMBER, ValueKind.INTEGER, ValueKind.TEXT
 SECONDS = _argument(
     "seconds", NUMBER, "length of the record", unit="s", low=SHORTEST_RECORD, high=LONGEST_RECORD, needed=True
@@ -89,6 +94,10 @@ VERSION = _argument(
     high=MAX_VERSION,
 )
 ALARM_NUMBER = _argument("number", INTEGER, "of the alarm", unit="1", low=1, high=U53, needed=True)
+SIGMA = _argument(
+    "sigma", NUMBER, "standard deviation", unit="rad", low=math.radians(FINEST_DEG), high=math.pi, needed=True
+)
+SIGMA_M = _argument("sigma", NUMBER, "standard deviation", unit="m", low=1e-4, high=10.0, needed=True)
 FILE = "file of the folder `calibrations` without its `.json`, or `identity`"
 SHA256 = _result("sha256", TEXT, "hash of the parameter block in use")
 ONE_AN_IMU = "one an IMU"
@@ -238,6 +247,68 @@ COMMANDS: tuple[CommandSpec, ...] = (
         ObeyedBy.GROUND,
         "proposes the accelerometer biases that the surveys of the hole show, in place of attitudes and `solve`",
         action="surveys",
+    ),
+    CommandSpec(
+        "north",
+        ObeyedBy.GROUND,
+        "tells where the encoder's zero points; the surveys of before are adjusted to it",
+        (_angle("angle", "of the encoder's zero, from site north, clockwise", math.tau), SIGMA),
+        action="tell",
+    ),
+    CommandSpec(
+        "collar",
+        ObeyedBy.GROUND,
+        "tells the direction of the hole at the collar; what the first station says against it is told back",
+        (
+            _argument("inclination", NUMBER, "from vertical", unit="rad", low=0.0, high=math.pi, needed=True),
+            _angle("azimuth", "of the lean, from site north", math.tau),
+            SIGMA,
+        ),
+        action="tell",
+    ),
+    CommandSpec(
+        "joint",
+        ObeyedBy.GROUND,
+        "tells the angle of the joint at the upper end of a tube, of which its node was told none or another",
+        (
+            _angle("angle", "read from the scribe marks, the part above to this tube", math.tau),
+            SIGMA,
+            _argument(
+                "used",
+                NUMBER,
+                "angle that the node was told; left out where it was told none",
+                unit="rad",
+                low=-math.tau,
+                high=math.tau,
+            ),
+            _argument(
+                "upper",
+                INTEGER,
+                "the part above: the tube there when left out; 0 is the drive head, from which each tube hung once",
+                unit="1",
+                low=0,
+                high=MAX_TUBE,
+            ),
+        ),
+    ),
+    CommandSpec(
+        "length",
+        ObeyedBy.GROUND,
+        "tells the measured length of a tube",
+        (_argument("length", NUMBER, "from shoulder to shoulder", unit="m", low=0.1, high=20.0, needed=True), SIGMA_M),
+    ),
+    CommandSpec(
+        "stick_up",
+        ObeyedBy.GROUND,
+        "tells how far the zero of the depth is over the collar",
+        (_argument("height", NUMBER, "over the collar", unit="m", low=-20.0, high=20.0, needed=True), SIGMA_M),
+        action="tell",
+    ),
+    CommandSpec(
+        "setup",
+        ObeyedBy.GROUND,
+        "takes the newest of north, collar, joint, length and stick-up back that still stands",
+        action="undo",
     ),
 )
 NAMES = tuple(dict.fromkeys(spec.name for spec in COMMANDS))

@@ -15,6 +15,7 @@ from telemetry.presentation.msgpack_codec import encode_message
 
 VAR = (0.0034**2) / 32
 CALIBRATED = {"accelerometer_bias_std_deg": 0.002}
+TOLD = {"north_std_deg": 1e-12, "collar_std_deg": 1e-12, "collar_inclination_deg": 0.0, "mount_tilt_std_deg": 0.01}
 COV = ((VAR, 0.0, 0.0), (0.0, VAR, 0.0), (0.0, 0.0, VAR))
 
 
@@ -22,11 +23,13 @@ class Rig:
     """A ground station and the station of tube 1, joined directly by hand: frames in, frames out."""
 
     def __init__(self, folder: Path, **settings: Any) -> None:
-        self.ground = GroundProcess(GroundConfig(folder=folder, **CALIBRATED | settings))
+        self.ground = GroundProcess(GroundConfig(folder=folder, **CALIBRATED | TOLD | settings))
         self.tube = Endpoint(1, frozenset(Side), boot_count=1, is_clock_root=True)
         self.now = 1000.0
         self.source = DepthSource()
         self.hops: dict[int, int] = {}  # as each tube has told them last
+        self.untold: dict[int, NodeFlag] = {}  # angles that the node of a tube was not told
+        self.yaw, self.systematic_var = 0.0, 1e-8  # of every survey, rad and rad^2
 
     md = 0.0
 
@@ -69,7 +72,7 @@ class Rig:
         self.hops[tube] = hops
         state = NodeState(
             tube, self.now, hops, NodeMode.TRACKING, 1.0, 1e-6, 1e-6, (0.0, 0.0, 0.0), scale, 0.0, 1e-6, 0.1, 1e-8,
-            NodeFlag.NONE, 5, 0,
+            self.untold.get(tube, NodeFlag.NONE), 5, 0,
         )  # fmt: skip
         self.tube.send_state(state, self.now)
 
@@ -95,7 +98,9 @@ class Rig:
         lean = math.radians(inclination_deg)
         imus = (ImuMean((9.81 * math.sin(lean), 0.0, -9.81 * math.cos(lean)), COV),)
         hops = self.hops.get(tube, 1)
-        message = SurveyMeasurement(tube, sequence, self.now, hops, imus, 0.0, 1e-8, 1e-8, 32, 20.0, flags)
+        flags |= self.untold.get(tube, NodeFlag.NONE)
+        yaw = self.yaw, 1e-8, self.systematic_var
+        message = SurveyMeasurement(tube, sequence, self.now, hops, imus, *yaw, 32, 20.0, flags)
         self.tube.mail.submit(message, self.now)
         self.run(2.0)
         self.read_depth(self.md)

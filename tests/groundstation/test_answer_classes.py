@@ -20,6 +20,8 @@ from groundstation.service.answers.shapes.answer_fields import (
     filled_columns,
     object_schema,
 )
+from telemetry.application.arguments import shown_name
+from telemetry.application.commands import COMMANDS
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "groundstation" / "gateway" / "page" / "static" / "js"
@@ -106,6 +108,7 @@ def field_names(shape: type[Any]) -> Iterator[str]:
 
 @pytest.mark.parametrize("file", [*sorted(PAGE.glob("*.js")), *sorted((ROOT / "borechain" / "crew").glob("*.py"))])
 def test_what_draws_answers_draws_fields_that_they_have(file: Path) -> None:
-    known = {"rig_time_s", *(name for one in ANSWERS.values() for name in field_names(one.shape))}
+    told = {shown_name(one.quantity) for spec in COMMANDS for one in spec.arguments}  # by a form
+    known = {"rig_time_s", *told, *(name for one in ANSWERS.values() for name in field_names(one.shape))}
     drawn = set(re.findall(rf"""(?:\.|\["|get\(")([a-z][a-z_]*_(?:{UNITS}))\b""", file.read_text()))
     assert drawn - known == set()

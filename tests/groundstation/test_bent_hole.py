@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hand_fed import TOLD
 from schemas import check_answers, shown_on
 from test_model import survey
 
@@ -37,7 +38,7 @@ def passes(stops: int) -> list[Placed]:
 
 
 def model_of(folder: Path, placed: list[Placed], **settings: Any) -> RigModel:
-    model = RigModel.begin(GroundConfig(folder=folder, **settings))
+    model = RigModel.begin(GroundConfig(folder=folder, **TOLD | settings))
     model.string.tally.restore([5, 4, 3, 2, 1])
     for measurement, md in placed:
         assert model.placement.place_one(measurement, md) == ""

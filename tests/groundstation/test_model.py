@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hand_fed import TOLD
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from schemas import check_answers, shown_on
@@ -56,7 +57,7 @@ def passes(stops: int, inclination_deg: Callable[[int, int], float], apart: floa
 
 def knowing(tmp_path: Path, measurements: list[Placed], tubes: int = 0, **settings: Any) -> RigModel:
     """RigModel of surveys in the order in which they come; the string's order is known beforehand."""
-    model = RigModel.begin(GroundConfig(folder=tmp_path, **settings))
+    model = RigModel.begin(GroundConfig(folder=tmp_path, **TOLD | settings))
     model.string.tally.restore(list(range(tubes, 0, -1)))
     for measurement, md in measurements:
         assert model.placement.place_one(measurement, md) == ""

@@ -149,7 +149,7 @@ def test_a_ground_station_that_knows_nothing_says_so(tmp_path: Path) -> None:
     answer = shown_on(RigModel.begin(GroundConfig(folder=tmp_path)), "verdict")
     check_answer(answer, fields_of_answer(VerdictAnswer))
     assert answer["verdict"] == "dont_know"
-    assert answer["doubts"] == ["no_survey", "clock", "depth", "stale"]
+    assert answer["doubts"] == ["no_survey", "setup", "clock", "depth", "stale"]
     assert answer["line"] == "DON'T KNOW: no station has been surveyed yet"
 
 

@@ -36,6 +36,7 @@ class Life:
         self.angle = 1.0
         self.sequence = 5
         self.clock_var = 1e-8  # s^2
+        self.hops = 1
         self.said: list[object] = []
 
     def cycles(self, count: int, rate: float = 0.0, *, aided: bool = True) -> list[object]:
@@ -44,7 +45,7 @@ class Life:
             self.now += PERIOD
             self.angle += rate * PERIOD
             self.sequence += rate != 0.0
-            around = RigContext(True, 1, self.now, self.clock_var, True)
+            around = RigContext(True, self.hops, self.now, self.clock_var, True)
             reading = ImuReading(self.now - PERIOD, self.now, (0.0, 0.0, rate), (0.0, 0.3, -9.8))
             said.extend(self.tube.on_cycle(reading, around))
             aiding = replace(

@@ -38,6 +38,7 @@ class VerdictDoubt(enum.StrEnum):
     CLOCK = "clock"
     YAW = "yaw"
     UNCERTAIN = "uncertain"
+    SETUP = "setup"
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,9 @@ from groundstation.config import GroundConfig
 from groundstation.service.alarms.rig_alarms import RigAlarms
 from groundstation.service.alarms.verdict import Known, VerdictDoubt
 from groundstation.service.hole.surveyed_hole import SurveyedHole
+from groundstation.service.setup.readiness import told_briefly
+from groundstation.service.setup.setup_book import SetupBook
+from groundstation.service.setup.setup_items import missing_names, setup_items
 from groundstation.service.string.known_string import KnownString
 
 BEHIND = 1.5  # tubes by which the deepest survey may be behind the bit
@@ -20,7 +23,9 @@ ALARMS = {
 }
 
 
-def known_of(config: GroundConfig, string: KnownString, hole: SurveyedHole, alarms: RigAlarms) -> Known:
+def known_of(
+    config: GroundConfig, string: KnownString, setup: SetupBook, hole: SurveyedHole, alarms: RigAlarms
+) -> Known:
     """What is known of the way of the hole."""
     design = config.design
     worst = hole.deviations.worst(first=1)
@@ -31,10 +36,17 @@ def known_of(config: GroundConfig, string: KnownString, hole: SurveyedHole, alar
         worst=worst,
         projection=hole.projection if worst is not None else None,
         doubts=(
+            *_doubts_of_setup(config, setup, string),
             *_doubts_of_time(string, alarms, config.stale_after),
             *_doubts_of_surveys(string, hole, alarms, BEHIND * config.tube_length),
         ),
     )
+
+
+def _doubts_of_setup(config: GroundConfig, setup: SetupBook, string: KnownString) -> Iterator[tuple[VerdictDoubt, str]]:
+    """Without north, or the angle of a joint, no azimuth is known."""
+    if missing := missing_names(setup_items(config, setup, string)):
+        yield VerdictDoubt.SETUP, f"not told: {told_briefly(missing)}"
 
 
 def _doubts_of_surveys(

@@ -22,6 +22,7 @@ from groundstation.service.answers.shapes.hole_shapes import (
     UncertaintyAnswer,
 )
 from groundstation.service.answers.shapes.order_shapes import Order, OrdersAnswer, RecalibrationAnswer
+from groundstation.service.answers.shapes.setup_shapes import SetupAnswer
 from groundstation.service.answers.shapes.string_shapes import (
     AnswerHeader,
     ChangesAnswer,
@@ -149,6 +150,12 @@ ANSWERS: Final = {
             "wall",
             WallAnswer,
             "joints of this hole with its neighbours: thickness, probability of an opening, extra columns",
+            on_page=True,
+        ),
+        AnswerKey(
+            "setup",
+            SetupAnswer,
+            "what is known of the rig, by whom and how well, what each item costs at the toe, and what is missing",
             on_page=True,
         ),
         AnswerKey("alarms", AlarmsAnswer, "tolerance and rig alarms, stations where the hole moved", on_page=True),

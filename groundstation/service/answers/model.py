@@ -15,6 +15,7 @@ from groundstation.service.hole.placement import Placement
 from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.service.orders.order_book import OrderBook
 from groundstation.service.orders.recalibration.procedure import FieldProcedure
+from groundstation.service.setup.setup_book import SetupBook
 from groundstation.service.string.known_string import KnownString
 from groundstation.survey.fusion.shared import SharedErrors
 
@@ -28,6 +29,7 @@ class RigModel:
 
     config: GroundConfig
     string: KnownString
+    setup: SetupBook
     hole: SurveyedHole
     placement: Placement
     rig_alarms: RigAlarms
@@ -48,12 +50,14 @@ class RigModel:
             When the wall of its configuration cannot be read.
         """
         string, shared = KnownString(config), SharedErrors()
-        hole = SurveyedHole(config, shared)
+        setup = SetupBook(config)
+        hole = SurveyedHole(config, shared, setup)
         return cls(
             config=config,
             string=string,
+            setup=setup,
             hole=hole,
-            placement=Placement(config, string, hole, shared),
+            placement=Placement(config, string, hole, shared, setup),
             rig_alarms=RigAlarms(),
             crew_alarms=CrewAlarms(),
             orders=OrderBook(),

@@ -33,7 +33,8 @@ PHRASES = {
 @view_of(Verdict)
 def answer_verdict(k: RigModel, _p: Parameters) -> Verdict:
     """The verdict of this moment."""
-    rig, good_for, known = k.config.rig, k.config.stale_after, known_of(k.config, k.string, k.hole, k.rig_alarms)
+    rig, good_for = k.config.rig, k.config.stale_after
+    known = known_of(k.config, k.string, k.setup, k.hole, k.rig_alarms)
     found = judge_hole(known)
     way = None if found.about is None or found.act_before is None else steering_view(found.about, found)
     return Verdict(

@@ -7,8 +7,8 @@ import functools
 import sqlalchemy as sa
 from sqlalchemy.dialects import sqlite
 
-SCHEMA = 3
-READABLE = (2, 3)  # schemas; what a later one has more is made when it is opened
+SCHEMA = 4
+READABLE = (2, 3, 4)  # schemas; what a later one has more is made when it is opened
 METADATA = sa.MetaData()
 META = sa.Table(
     "meta",
@@ -88,6 +88,13 @@ ALARMS = sa.Table(
     sa.Column("content", sa.Text, nullable=False),
 )
 ALL_ALARMS = sa.select(ALARMS).order_by(ALARMS.c.number)
+SETUP = sa.Table(
+    "setup",
+    METADATA,
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("content", sa.Text, nullable=False),
+)
+ALL_SETUP, ADD_SETUP = sa.select(SETUP).order_by(SETUP.c.number), sa.insert(SETUP)
 DROP_ALARM, ADD_ALARM = sa.delete(ALARMS).where(ALARMS.c.number == sa.bindparam("its_number")), sa.insert(ALARMS)
 
 

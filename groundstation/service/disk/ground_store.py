@@ -22,12 +22,14 @@ from groundstation.service.disk.database import Database
 from groundstation.service.disk.database_tables import (
     ADD,
     ADD_ALARM,
+    ADD_SETUP,
     ADD_STAND,
     ALARMS,
     ALL_ALARMS,
     ALL_BLOCKS,
     ALL_JOINTS,
     ALL_MESSAGES,
+    ALL_SETUP,
     ALL_STANDS,
     BLOCKS,
     DROP,
@@ -38,10 +40,12 @@ from groundstation.service.disk.database_tables import (
     PLACE,
     PROGRESS,
     RECALIBRATION,
+    SETUP,
     STRING,
     WHOLE_STRING,
     add_new,
 )
+from groundstation.service.setup.told_value import DamagedSetupError, ToldValue, told_of_text, told_to_text
 from groundstation.service.string.depth import NEVER, DepthDoubt, Instant
 from groundstation.service.string.stored import Stored
 from groundstation.survey.fusion.joint_angles import JointAngle, Pair
@@ -247,6 +251,31 @@ class Store(Database):
             try:
                 found.append(alarm_of_text(row.content))
             except DamagedAlarmError:
+                self.damaged += 1
+        return found
+
+    def keep_told(self, told: ToldValue) -> None:
+        """Store what was told of the setup, before it counts.
+
+        Raises
+        ------
+        StoreError
+            When the disk refuses.
+        """
+        with self._writing() as connection:
+            connection.execute(ADD_SETUP, {"number": told.number, "content": told_to_text(told)})
+
+    def told(self) -> list[ToldValue]:
+        """What was told of the setup, the oldest first; what is damaged is passed over and counted."""
+        if not self._has(SETUP):
+            return []
+        with self._refusing(), self._engine.connect() as connection:
+            rows = connection.execute(ALL_SETUP).all()
+        found = []
+        for row in rows:
+            try:
+                found.append(told_of_text(row.content))
+            except DamagedSetupError:
                 self.damaged += 1
         return found
 

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from groundstation.config import GroundConfig
 from groundstation.service.hole.resolving import Found, Resolver
 from groundstation.service.hole.surveyed_hole import SurveyedHole
+from groundstation.service.setup.setup_book import SetupBook
+from groundstation.service.setup.setup_correction import corrected_measurement, depth_shift
 from groundstation.service.string.known_string import KnownString
 from groundstation.service.string.stored import Stored
 from groundstation.survey.fusion.shared import SharedErrors
@@ -28,6 +30,7 @@ class Placement:
     string : that was surveyed
     hole : that they belong to
     shared : the errors that they share
+    setup : what was told, by which they are corrected
 
     Attributes
     ----------
@@ -36,10 +39,13 @@ class Placement:
     refused : measurements with invalid numbers
     """
 
-    def __init__(self, config: GroundConfig, string: KnownString, hole: SurveyedHole, shared: SharedErrors) -> None:
+    def __init__(
+        self, config: GroundConfig, string: KnownString, hole: SurveyedHole, shared: SharedErrors, setup: SetupBook
+    ) -> None:
         mount_var = math.radians(config.mount_std_deg) ** 2
         bias_std = math.radians(config.accelerometer_bias_std_deg) * config.gravity
-        self._string, self._hole = string, hole
+        self._string, self._hole, self._setup = string, hole, setup
+        self._tube_length = config.tube_length
         self._resolver = Resolver(config.gravity, shared, mount_var, bias_std)
         self.waiting: list[Waiting] = []
         self.set_aside: list[SurveyMeasurement] = []
@@ -78,18 +84,24 @@ class Placement:
 
         None for each that is not fused.
         """
-        fused, above, places = [], [], []
+        fused, above, places, depths = [], [], [], []
         for place, m in enumerate(measurements):
             if trust_of(m.flags) not in NEVER_FUSED:
-                fused.append(m)
-                above.append(self._string.tally.above(m.tube, m.hops))
+                chain = self._string.tally.above(m.tube, m.hops)
+                fused.append(corrected_measurement(m, chain, self._setup))
+                above.append(chain)
                 places.append(place)
+                depths.append(self._told_depth(m.tube, mds[place]))
         found: list[Found | None] = [None] * len(measurements)
         if fused:
-            resolved = self._resolver.resolve_measurements(fused, [mds[place] for place in places], above)
+            resolved = self._resolver.resolve_measurements(fused, depths, above)
             for place, one in zip(places, resolved, strict=True):
                 found[place] = one
         return found
+
+    def _told_depth(self, tube: int, md: float) -> float:
+        """Measured depth (m) of a tube's node by the lengths that were told."""
+        return max(md + depth_shift(tube, self._string.tubes, self._tube_length, self._setup), 0.0)
 
     def place(self, measurement: SurveyMeasurement, found: Found | None) -> str:
         """Give the hole what a measurement came to; returns the kind of alarm where it is not used as it is, or ''."""

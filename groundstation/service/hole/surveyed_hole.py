@@ -21,6 +21,8 @@ from groundstation.service.hole.history import History
 from groundstation.service.hole.movement import Moved, Movement
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
+from groundstation.service.setup.setup_book import SetupBook
+from groundstation.service.setup.setup_priors import collar_direction
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import SharedErrors
@@ -39,12 +41,22 @@ class SurveyedHole:
     ----------
     config : design, tolerance and weighting
     shared : the errors that its readings share
+    setup : what was told of the rig, the direction at the collar among it
     """
 
-    def __init__(self, config: GroundConfig, shared: SharedErrors) -> None:
+    def __init__(self, config: GroundConfig, shared: SharedErrors, setup: SetupBook) -> None:
         self._config = config
         self._shared = shared
+        self._setup = setup
         self._design = config.design
+        self.version = 0  # grows with every survey
+        self.newest = 0  # number of the measurement that came last, revisions included
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        """Forget every stop; they are added again, as they are by what was told of the rig since."""
+        self.version += 1
+        self._collar = collar_direction(self._config, self._setup)
         self._stops = ResolvedStops()
         self._station_of: list[SurveyStation] = []  # of each of its rows
         self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
@@ -53,13 +65,11 @@ class SurveyedHole:
         self._alarms = AlarmList()
         self._history = History()
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
-        self._trajectory = Trajectory(collar=config.collar, keeps_columns=False)
+        self._trajectory = Trajectory(collar=self._collar, keeps_columns=False)
         self._deviations = self._deviate()
         self._projection: Deviation | None = None
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
         self._newest_at = -math.inf  # s, rig time of the newest survey
-        self.version = 0  # grows with every survey
-        self.newest = 0  # number of the measurement that came last, revisions included
 
     def add_stop(self, stops: ResolvedStops, row: int, epoch: int) -> bool:
         """Take a stop with rig time of an epoch; a revision of one that is known takes its place, unless it is older.
@@ -128,6 +138,11 @@ class SurveyedHole:
         """From the collar down."""
         self.settle()
         return self._trajectory
+
+    @property
+    def collar(self) -> Direction:
+        """Direction at the collar as well as it is known."""
+        return self._collar
 
     def direction_of(self, station: SurveyStation) -> Direction:
         """Direction of the hole at a station, the transport of the string in it."""
@@ -210,7 +225,7 @@ class SurveyedHole:
             return []
         mds, directions = zip(*measured, strict=True)
         places = self._shared.transport_places(len(measured) + 1)
-        self._carried = dict(zip(mds, carry_directions(self._config.collar, directions, places), strict=True))
+        self._carried = dict(zip(mds, carry_directions(self._collar, directions, places), strict=True))
         return [(md, carried.direction) for md, carried in self._carried.items()]
 
     def _deviate(self) -> Deviations:

@@ -23,6 +23,7 @@ from groundstation.service.orders.uploads import Uploads
 from groundstation.service.process.intake_tape import DEPTH, MESSAGE, ORDER, TIMER, Tape
 from groundstation.service.process.learner import Learner
 from groundstation.service.process.operator_access import BlockUpload, OperatorAccess, Outgoing
+from groundstation.service.setup.setup_items import shown_marks
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seal_watch import SealWatch, refusal_of
 from telemetry.errors import DecodeError
@@ -117,6 +118,7 @@ class GroundProcess(Process):
         self.listeners: list[Listener] = []
         self._stale: set[int] = set()
         self._early: deque[DepthReading] = deque(maxlen=EARLY)
+        self._setup_marks: tuple[object, ...] = ()  # of the setup as it was published
         self._beat_at = -math.inf
         self._plane = -1  # of the wall, that the bit has passed last
         self._keeper = StringKeeper(self.store, model.string)
@@ -125,6 +127,7 @@ class GroundProcess(Process):
         self.operator.changed = self._publish
         self.operator.ended = self.endpoint.mail.withdraw
         self.operator.accepted = self._note_order
+        self.operator.follow_setup = self._follow_setup
         self._learner.restore()
         self.model.crew_alarms.restore(self.store.alarms(), self._conditions())
 
@@ -231,6 +234,7 @@ class GroundProcess(Process):
         """Find what is wrong, ask again for what is missing, and publish who fell silent or came back."""
         self._keeper.keep_depth_doubt()
         self._place_waiting()
+        self._follow_setup()
         if consequences := self._learner.find_consequences():
             self._publish(consequences)
         self.watch.look(now)
@@ -251,6 +255,9 @@ class GroundProcess(Process):
         changed, self._stale = sorted(stale ^ self._stale), stale
         if changed:
             self._publish([*(f"nodes/{tube}" for tube in changed), "status", "string"])
+        if (marks := shown_marks(self.model.setup, self._string)) != self._setup_marks:
+            self._setup_marks = marks
+            self._publish(["setup"])
         self._tell_crew(now)
         if alarms.drain_changed():
             self._publish(["alarms", "status", "verdict"])
@@ -271,6 +278,12 @@ class GroundProcess(Process):
             with refusing_disk():
                 self.store.keep_alarms(changed)
             self._publish(["alarms"])
+
+    def _follow_setup(self) -> int:
+        """Adjust the hole to what was told of the rig; returns how many surveys it is made of."""
+        if changed := self._learner.follow_setup():
+            self._publish(changed)
+        return len(self.model.hole.stops)
 
     def _conditions(self) -> list[Condition]:
         return conditions_of(self.model.rig_alarms, self._string, self.model.hole)
@@ -311,6 +324,7 @@ class GroundProcess(Process):
         match message:
             case NodeState() if self._string.on_state(message, now):
                 self.model.recalibration.on_state(message)
+                self.model.setup.on_flags(message.tube, message.hops, message.flags)
                 self.watch.on_state(message)
                 with refusing_disk():
                     self._keeper.keep_tally()

@@ -16,7 +16,7 @@ from groundstation.service.hole.resolving import Found
 from groundstation.service.string.stored import Stored
 from telemetry.messages import Event, Kept, StaticRecord, SurveyMeasurement
 
-CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column")
+CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column", "setup")
 RESTORED_TOGETHER = 256  # messages
 
 
@@ -35,6 +35,8 @@ class Learner:
         self._store, self._watch, self._keeper = store, watch, keeper
         self._string, self._hole, self._placement = model.string, model.hole, model.placement
         self._orders, self._recalibration = model.orders, model.recalibration
+        self._setup = model.setup
+        self._followed = 0  # version of the setup by which the hole is
         self._arrived: list[Stored[Kept]] = []  # since the last transaction
         # alarms of the hole, moves and stops of the string that were told
         self._known: tuple[list[DeviationAlarm], int, int] = ([], 0, 0)
@@ -119,6 +121,41 @@ class Learner:
 
     def restore(self) -> None:
         """Go on with everything that was stored, some hundred messages at a time."""
+        self._setup.add(self._store.told())
+        self._hole.begin_anew()
+        self._restore_messages()
+        self.follow_setup()  # what a node says of its joints may stand in a later survey
+        self.find_consequences()
+
+    def follow_setup(self) -> list[str]:
+        """Adjust the hole to what was told of the rig since; returns the paths that changed.
+
+        Where the database cannot be read the hole stays as it is until it can.
+        """
+        version = self._setup.version
+        if version == self._followed:
+            return []
+        damaged = self._store.damaged
+        try:
+            stored = [one for one in self._store.messages() if isinstance(one.message, SurveyMeasurement)]
+        except StoreError:
+            return []
+        self._store.damaged = damaged  # they were counted at the start
+        self._hole.begin_anew()
+        placed = [(one.message, one.md) for one in stored if one.md is not None]
+        for begin in range(0, len(placed), RESTORED_TOGETHER):
+            some = placed[begin : begin + RESTORED_TOGETHER]
+            found = self._placement.resolve_measurements([m for m, _ in some], [md for _, md in some])
+            for (measurement, _), stop in zip(some, found, strict=True):
+                if stop is not None:
+                    self._hole.add_stop(*stop, self._string.epoch_of(measurement))
+        self._followed = version
+        self.find_consequences()
+        return sorted({*self._by_survey, "alarms", "history", "verdict", "status"})
+
+    def _restore_messages(self) -> None:
+        """Learn everything that was stored."""
+        self._followed = self._setup.version
         messages = self._store.messages()
         while some := list(itertools.islice(messages, RESTORED_TOGETHER)):
             placed = {
@@ -130,11 +167,11 @@ class Learner:
             found = dict(zip(placed, self._placement.resolve_measurements(measurements, mds), strict=True))
             for place, one in enumerate(some):
                 if place in placed:
+                    self._note_flags(placed[place][0])
                     self._string.numbers.add_number(one.message.tube, one.message.sequence)
                     self._place(placed[place][0], found[place])
                 else:
                     self._learn(one)
-        self.find_consequences()
 
     def _learn(self, one: Stored[Kept]) -> Sequence[str]:
         """Add a stored message to what is known, a measurement to those that wait; returns the paths that changed."""
@@ -152,9 +189,14 @@ class Learner:
                 self._recalibration.on_static_record(message)
                 return ("static_records",)
             case SurveyMeasurement():
+                self._note_flags(message)
                 self._string.on_measurement(message, is_placed=False)
                 self._watch.on_measurement(message, self._placement.wait_for_depth(Stored(message, one.md, one.below)))
                 return self._by_survey
+
+    def _note_flags(self, measurement: SurveyMeasurement) -> None:
+        """See which angles the node of a survey was not told."""
+        self._setup.on_flags(measurement.tube, measurement.hops, measurement.flags)
 
     def _place(self, measurement: SurveyMeasurement, found: Found | None) -> None:
         """Give the hole what a measurement was resolved to."""

@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from groundstation.config import GroundConfig
@@ -18,12 +19,14 @@ from groundstation.errors import ConfigurationError, SelectorError
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.paths import find_path
 from groundstation.service.disk.ground_store import Store
+from groundstation.service.hole.collar_doubt import collar_doubt
 from groundstation.service.orders.blocks import block_of_files
 from groundstation.service.orders.order_book import OrderState, SentOrder
 from groundstation.service.orders.recalibration.control import Recalibration
 from groundstation.service.orders.recalibration.procedure import Request
 from groundstation.service.orders.surveyed_biases import surveyed_biases
 from groundstation.service.orders.uploads import Uploads
+from groundstation.service.setup.setup_orders import SetupOrders
 from groundstation.survey.fusion.force_biases import SurveyedBiases
 from telemetry.application.arguments import check_arguments, parse_parameters, parse_tube
 from telemetry.application.commands import COMMANDS, CommandSpec, ObeyedBy, find_command
@@ -37,6 +40,7 @@ ANSWERED_WITHIN = 900.0  # s, own clock, after which an order that no tube has a
 NO_KEY = "key_file: expected the key file of the rig, without it no node takes a block"
 LONGEST_NAME = 64  # characters, of who orders
 UPLOAD = "upload_parameters"
+SETUP_COMMANDS = ("north", "collar", "joint", "length", "stick_up", "setup")
 RECALIBRATION = "recalibration"  # who orders what the calibration in the field asks for
 
 
@@ -76,9 +80,14 @@ class OperatorAccess:
         self._recalibration = Recalibration(
             model.recalibration, store, config.calibrations, self._cancel_upload, self._surveyed_biases
         )
+        doubt = partial(collar_doubt, model.hole)
+        self._setup = SetupOrders(model.setup, store, lambda: self._string.tubes, self._follow, doubt)
         self._handlers: dict[str, Callable[[SentOrder], None]] = {
-            spec.name: getattr(self, spec.name) for spec in COMMANDS if spec.by is ObeyedBy.GROUND
+            spec.name: self.tell_setup if spec.name in SETUP_COMMANDS else getattr(self, spec.name)
+            for spec in COMMANDS
+            if spec.by is ObeyedBy.GROUND
         }
+        self.follow_setup: Callable[[], int] = lambda: 0  # called when the setup is told anew; how many surveys follow
         self.wake: Callable[[], None] = lambda: None  # called when something is to be sent
         self.ended: Callable[[int], None] = lambda _number: None  # called with an order that is not to be sent any more
         self.accepted: Callable[[str, Mapping[str, str], str], None] = lambda _name, _parameters, _by: (
@@ -196,6 +205,14 @@ class OperatorAccess:
             if alarm.kind.code == "joint":
                 self._model.rig_alarms.clear("joint", alarm.subject)
         order.advance(OrderState.DONE)
+
+    def tell_setup(self, order: SentOrder) -> None:
+        """Take what is told of the setup, or take it back."""
+        order.advance(OrderState.DONE, self._setup.obey(order))
+        self.changed(["setup", "verdict"])
+
+    def _follow(self) -> int:
+        return self.follow_setup()
 
     def alarm(self, order: SentOrder) -> None:
         """Acknowledge an alarm, shelve it or take it back; kept on the disk before the order is done."""

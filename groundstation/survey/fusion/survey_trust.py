@@ -26,7 +26,7 @@ from groundstation.survey.fusion.resolve import Resolved
 from telemetry.messages import NodeFlag
 
 Array = npt.NDArray[np.float64]
-UNKNOWN_YAW_VAR = math.pi**2 / 3.0  # rad^2, uniform on the circle
+UNKNOWN_YAW_VAR = math.pi**2 / 3.0  # rad^2, uniform on the circle, as nodes say it (``telemetry.messages``)
 ALONG, ACROSS = 1.5, UNKNOWN_YAW_VAR  # of the squared lean
 
 
@@ -48,6 +48,8 @@ EFFECTS: dict[NodeFlag, Trust] = {
     NodeFlag.CLOCK_UNSYNCHRONISED: Trust.UNDATED,
     NodeFlag.BIAS_UNKNOWN: Trust.UNKNOWN_YAW,
     NodeFlag.NOT_SAVED: Trust.FULL,  # of the node's disk, not of its yaw
+    NodeFlag.DRIVE_UNTOLD: Trust.FULL,  # the variance is that of any yaw, until the ground station is told the angle
+    NodeFlag.LOWER_UNTOLD: Trust.FULL,  # of the tubes below
     NodeFlag.SENSOR_FAULT: Trust.SET_ASIDE,  # the force may be one that stands for a faulty sensor's
 }
 TOGETHER: dict[NodeFlag, Trust] = {

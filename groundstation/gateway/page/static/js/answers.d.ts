@@ -87,7 +87,7 @@ export interface Verdict {
   /** what it rests on, or why it is not known */
   why: string[];
   /** why it is not known, as words */
-  doubts: ("no_survey" | "stale" | "depth" | "clock" | "yaw" | "uncertain")[];
+  doubts: ("no_survey" | "stale" | "depth" | "clock" | "yaw" | "uncertain" | "setup")[];
   /** measured depth of the bit */
   bit_md_m: number | null;
   /** length of the design axis */
@@ -203,7 +203,7 @@ export interface MeasurementRow {
   /** between the stop and the end of the average */
   settle_s: number;
   /** trust in the own yaw */
-  flags: ("yaw_untrusted" | "aiding_old" | "innovation_rejected" | "rate_exceeded" | "restored" | "clock_unsynchronised" | "bias_unknown" | "sensor_fault" | "not_saved")[];
+  flags: ("yaw_untrusted" | "aiding_old" | "innovation_rejected" | "rate_exceeded" | "restored" | "clock_unsynchronised" | "bias_unknown" | "sensor_fault" | "not_saved" | "drive_untold" | "lower_untold")[];
   /** what the flags make of it */
   trust: "full" | "unknown_yaw";
   /** checks that it failed */
@@ -518,6 +518,61 @@ export interface WallAnswer {
   wall: WallNeighbourhood | null;
 }
 
+/** One item of the setup. */
+export interface SetupRow {
+  /** name, such as north, joint.4-3 and mount.3 */
+  item: string;
+  /** what it is */
+  kind: "north" | "collar" | "joint" | "length" | "stick_up" | "mount" | "mount_turn" | "depth_scale" | "depth_offset" | "accelerometer" | "gyroscope" | "play" | "path" | "gravity";
+  /** tube, or joint as upper and lower tube; empty of what the rig has once */
+  subject: string;
+  /** one, of the collar inclination and azimuth; empty where it may be any */
+  value: number[];
+  /** standard deviation of each */
+  sigma: number;
+  /** of both: deg, m, m/s^2, deg/s, deg/m or 1 */
+  unit: string;
+  /** where it is from */
+  source: "told" | "measured" | "design" | "default";
+  /** the same in words */
+  detail: string;
+  /** it was told or measured */
+  told: boolean;
+  /** without it the hole is not known, and it was not told */
+  missing: boolean;
+  /** who told it; empty where no order did */
+  by: string;
+  /** when that was */
+  utc: string;
+  /** since then; null where no order told it */
+  age_s: number | null;
+  /** by orders, also what does not stand any more */
+  times_told: number;
+  /** standard deviation that it makes at the toe */
+  toe_cm: number;
+  /** across the hole, or along it where it is one of the depth */
+  way: "across" | "along";
+}
+
+/** What is known of the rig: what is missing first, then what costs most at the toe, across the hole before along. */
+export interface SetupAnswer {
+  /** nothing is missing */
+  ready: boolean;
+  /** items without which the hole is not known */
+  missing: string[];
+  /** the next thing to do */
+  todo: string;
+  /** item that costs most at the toe, across the hole */
+  worst: string;
+  /** measured depth of the toe */
+  at_m: number;
+  /** the costs are of the hole as surveyed; before the first station of its design */
+  surveyed: boolean;
+  /** what the costs do not hold */
+  left_out: string;
+  items: SetupRow[];
+}
+
 /** One alarm as the crew works with it. */
 export interface Alarm {
   /** of the alarm, never used twice */
@@ -812,7 +867,7 @@ export interface NodeAnswer {
   /** of the node's rig time */
   sigma_clock_s: number;
   /** trust in the own yaw */
-  flags: ("yaw_untrusted" | "aiding_old" | "innovation_rejected" | "rate_exceeded" | "restored" | "clock_unsynchronised" | "bias_unknown" | "sensor_fault" | "not_saved")[];
+  flags: ("yaw_untrusted" | "aiding_old" | "innovation_rejected" | "rate_exceeded" | "restored" | "clock_unsynchronised" | "bias_unknown" | "sensor_fault" | "not_saved" | "drive_untold" | "lower_untold")[];
   /** since its start */
   cycles: number;
   /** cycles that ended too late */
@@ -849,6 +904,7 @@ export interface Answers {
   column: AnswerHeader & ColumnAnswer;
   history: AnswerHeader & HistoryAnswer;
   wall: AnswerHeader & WallAnswer;
+  setup: AnswerHeader & SetupAnswer;
   alarms: AnswerHeader & AlarmsAnswer;
   recalibration: AnswerHeader & RecalibrationAnswer;
   orders: AnswerHeader & OrdersAnswer;

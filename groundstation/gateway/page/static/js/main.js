@@ -6,6 +6,7 @@ import { showAlarms, showOrders, showString, showTubes, showWall } from "./lists
 import { Picture } from "./picture.js";
 import { drawPlan } from "./plan.js";
 import { connectSession, order, readSession } from "./session.js";
+import { connectSetup, showSetup } from "./setup.js";
 import { follow } from "./stream.js";
 import { drawStrip } from "./strip.js";
 import { connectTheme } from "./theme.js";
@@ -13,11 +14,13 @@ import { showFacts, showVerdict } from "./verdict.js";
 
 const REFRESH_MS = 250;
 const SHELVED_MIN = 30;
+const AGED_EVERY_MS = 30e3;
 
 const picture = new Picture();
 const changed = new Set();
 let hello = {};
 let stringAt = 0;
+let agedAt = 0; // when ages of what was told were written last
 let earlier = null; // the column of a moment of the history
 let space = null; // what draws it in 3-D, once it is wanted
 let drawHole = drawPlan;
@@ -49,6 +52,10 @@ function paint() {
   const isNew = (...paths) => paths.some((path) => changed.has(path));
   if (isNew("history")) history.take(picture.answers.history.moments);
   if (isNew("column", "uncertainty", "status")) drawColumn();
+  if (isNew("setup") || now.steady > agedAt + AGED_EVERY_MS) {
+    agedAt = now.steady;
+    showSetup(picture.answers.setup, now.wall);
+  }
   if (isNew("wall")) showWall(wall?.wall);
   if (isNew("alarms")) showAlarms(alarms, orderAboutAlarm);
   if (isNew("orders")) showOrders(orders);
@@ -92,6 +99,7 @@ byId("depth").addEventListener("click", () => order("accept_depth", { action: "c
 byId("tube").addEventListener("change", (event) => { event.target.dataset.chosen = event.target.value; });
 byId("space").addEventListener("click", turnPlan);
 byId("print").addEventListener("click", () => window.print());
+connectSetup((name, parameters) => order(name, parameters, tell));
 connectTheme(byId("theme"));
 
 const stream = follow(onHeard, () => {});

@@ -1,0 +1,68 @@
+// The setup: what is known of the rig and what it costs at the toe, and the form that tells it.
+
+import { byId, element, fillList, write } from "./dom.js";
+
+/** @typedef {import("./answers").SetupAnswer} SetupAnswer */
+/** @typedef {import("./answers").SetupRow} SetupRow */
+
+const LEAST_CM = 0.05; // below it a cost is no cost
+const TUBE = ["tube", "tube", 1];
+const FIELDS = {
+  north: [["angle_deg", "zero from north °"], ["sigma_deg", "σ °"]],
+  collar: [["inclination_deg", "inclination °"], ["azimuth_deg", "azimuth °"], ["sigma_deg", "σ °"]],
+  joint: [TUBE, ["angle_deg", "angle °"], ["sigma_deg", "σ °"], ["used_deg", "node was told °", null], ["upper", "above it, 0 is the drive", null]],
+  length: [TUBE, ["length_m", "length m"], ["sigma_m", "σ m"]],
+  stick_up: [["height_m", "over the collar m"], ["sigma_m", "σ m"]],
+};
+const WITH_TUBE = ["joint", "length"]; // the others are one of the rig
+
+/**
+ * A row an item: what is missing first, then what costs most at the toe.
+ * @param {SetupAnswer} [setup]
+ * @param {number} now ms since 1970
+ */
+export function showSetup(setup, now) {
+  if (!setup) return;
+  byId("ready").className = setup.ready ? "" : "not";
+  write(byId("ready"), setup.ready ? "Ready to drill: north and every joint are told" : `NOT READY TO DRILL, not told: ${setup.missing.join(", ")}`);
+  const whose = setup.surveyed ? "as surveyed" : "of the design";
+  write(byId("next"), `Next: ${setup.todo}`);
+  write(byId("costs"), `Toe at ${setup.at_m.toFixed(1)} m, ${whose}. Its ± has besides: ${setup.left_out}.`);
+  fillList(byId("setup-items"), setup.items, (row) => row.item, () => element("tr", {}, ...Array.from({ length: 7 }, () => element("td"))), (line, row) => {
+    line.className = row.missing ? "grave" : !row.told && row.toe_cm >= LEAST_CM ? "serious" : "";
+    const toe = `${row.toe_cm.toFixed(1)}${row.toe_cm >= LEAST_CM && row.way === "along" ? " along" : ""}`;
+    const texts = [row.item.replaceAll("_", " "), toe, valueText(row), plain(row.sigma), row.unit, ageText(row, now), `${row.source}: ${row.detail}`];
+    texts.forEach((text, place) => write(line.children[place], text));
+  });
+}
+
+/** Connect the form; `order` takes a command and its parameters. */
+export function connectSetup(order) {
+  const kind = byId("tell-kind");
+  kind.replaceChildren(...Object.keys(FIELDS).map((name) => element("option", { value: name }, name.replaceAll("_", " "))));
+  const showFields = () => byId("tell-fields").replaceChildren(...FIELDS[kind.value].flatMap(([name, text, least]) => {
+    const input = element("input", { id: `tell-${name}`, name, type: "number", step: "any" });
+    input.required = least !== null;
+    return [element("label", { for: `tell-${name}` }, text), input];
+  }));
+  kind.addEventListener("change", showFields);
+  showFields();
+  byId("tell").addEventListener("submit", (submitted) => {
+    submitted.preventDefault();
+    const told = [...byId("tell-fields").querySelectorAll("input")].filter((input) => input.value !== "");
+    const parameters = Object.fromEntries(told.map((input) => [input.name, input.value]));
+    order(kind.value, WITH_TUBE.includes(kind.value) ? parameters : { action: "tell", ...parameters });
+  });
+  byId("take-back").addEventListener("click", () => order("setup", { action: "undo" }));
+}
+
+/** @param {SetupRow} row */
+const valueText = (row) => (row.value.length ? row.value.map(plain).join(" to ") : row.told ? "as its node was told" : "any");
+const plain = (value) => (value !== 0 && Math.abs(value) < 1e-4 ? "0" : String(Number(value.toPrecision(4))));
+
+/** @param {SetupRow} row */
+function ageText(row, now) {
+  if (!row.utc) return "–";
+  const minutes = Math.max(0, (now - Date.parse(row.utc)) / 60e3);
+  return minutes < 90 ? `${minutes.toFixed(0)} min` : `${(minutes / 60).toFixed(0)} h`;
+}

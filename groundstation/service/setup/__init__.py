@@ -1,0 +1,1 @@
+"""What turns readings into a hole and no reading tells: what is known of it, by whom, since when, and how well."""

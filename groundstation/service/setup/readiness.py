@@ -1,0 +1,52 @@
+"""Whether a rig is set up to drill: what is missing by name, and what to do next. No I/O."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from groundstation.service.setup.setup_items import ALONG, SetupItem, missing_names
+from groundstation.service.setup.told_value import SetupKind
+
+MOST_NAMED = 3  # joints in a line of the verdict
+WORTH_TELLING = 0.005  # m at the toe, from which on what was not told is the next thing to tell
+ORDERS = {
+    SetupKind.NORTH: "tell north: cmd/north?action=tell;angle_deg=..;sigma_deg=..",
+    SetupKind.COLLAR: "tell the collar: cmd/collar?action=tell;inclination_deg=..;azimuth_deg=..;sigma_deg=..",
+    SetupKind.STICK_UP: "tell the stick-up: cmd/stick_up?action=tell;height_m=..;sigma_m=..",
+    SetupKind.MOUNT: "align tube {tube} in slow turns: cmd/align?tube={tube}",
+    SetupKind.ACCELEROMETER: "calibrate tube {tube}: cmd/recalibrate?action=begin;tubes={tube}",
+    SetupKind.LENGTH: "measure tube {tube}: cmd/length?tube={tube};length_m=..;sigma_m=..",
+}
+
+
+def told_briefly(names: Sequence[str]) -> str:
+    """Names of what is missing as a crew says them: ``north, joints 4-3, 3-2 and 2 more``."""
+    joints = [name.partition(".")[2] for name in names if name.startswith(f"{SetupKind.JOINT}.")]
+    others = [name for name in names if not name.startswith(f"{SetupKind.JOINT}.")]
+    if not joints:
+        return ", ".join(others)
+    more = f" and {len(joints) - MOST_NAMED} more" if len(joints) > MOST_NAMED else ""
+    return ", ".join([*others, f"joint{'s' if len(joints) > 1 else ''} {', '.join(joints[:MOST_NAMED])}{more}"])
+
+
+def next_step(items: Sequence[SetupItem], costs: Mapping[str, float]) -> str:
+    """The one thing to do next: what is missing first, then what costs most at the toe and can be told or measured.
+
+    What moves the toe across the hole comes before what moves it along.
+    """
+    if missing := missing_names(list(items)):
+        return order_of(next(item for item in items if item.name == missing[0]))
+    guessed = [item for item in items if not item.is_told and item.kind in ORDERS]
+    worth = [item for item in guessed if costs.get(item.name, 0.0) >= WORTH_TELLING]
+    if not worth:
+        return "nothing: the setup is told"
+    return order_of(max(worth, key=lambda item: (item.kind not in ALONG, costs.get(item.name, 0.0))))
+
+
+def order_of(item: SetupItem) -> str:
+    """How an item is told or measured."""
+    if item.kind is SetupKind.JOINT:
+        upper, lower = item.subject.split("-")
+        drive = ";upper=0" if upper == "drive" else ""
+        return f"tell joint {item.subject}: cmd/joint?tube={lower};angle_deg=..;sigma_deg=..{drive}"
+    return ORDERS[item.kind].format(tube=item.subject)

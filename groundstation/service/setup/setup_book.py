@@ -1,0 +1,130 @@
+"""What was told of the setup, in the order of telling, and which joints the nodes know no angle of. No I/O.
+
+Nothing that was told is forgotten: what is told again or taken back stays in the book, and the newest entry that was
+not taken back stands. What the configuration of the ground station tells stands where no order did.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+from groundstation.config import GroundConfig
+from groundstation.service.setup.told_value import (
+    CONFIGURATION,
+    DRIVE,
+    SetupKind,
+    ToldValue,
+    item_name,
+)
+from telemetry.messages import NodeFlag
+
+Pair = tuple[int, int]  # upper tube, or ``DRIVE``, and lower tube
+
+
+class SetupBook:
+    """The book of one rig.
+
+    Parameters
+    ----------
+    config : of the ground station
+
+    Attributes
+    ----------
+    entries : everything that orders told, the oldest first
+    joints, lengths : what stands of the joints, and of the tubes
+    version : grows with everything by which surveys mean something else
+    revision : grows with everything that is entered, or that a node says anew of what it was told
+    """
+
+    def __init__(self, config: GroundConfig) -> None:
+        self._by_config = {told.name: told for told in told_by_config(config)}
+        self.entries: list[ToldValue] = []
+        self.version = self.revision = 0
+        self._standing: dict[str, ToldValue] = {}
+        self.joints: dict[Pair, ToldValue] = {}
+        self.lengths: dict[int, ToldValue] = {}
+        self._lowers: dict[int, bool] = {}  # by tube, whether its node was told the angle of the joint below it
+        self._drives: dict[int, bool] = {}  # and that of the joint to the drive head, of each that hung from it
+        self._stand()
+
+    def standing(self, kind: SetupKind, subject: object = "") -> ToldValue | None:
+        """What stands of an item; None where it was not told, or that was taken back."""
+        return self._standing.get(item_name(kind, subject))
+
+    def told_before(self, name: str) -> int:
+        """How often an item was told by orders, also what does not stand any more."""
+        return sum(entry.name == name and not entry.takes_back for entry in self.entries)
+
+    def next_number(self) -> int:
+        """Number of the next entry."""
+        return self.entries[-1].number + 1 if self.entries else 1
+
+    def newest(self) -> ToldValue | None:
+        """The entry that would be taken back; None where none stands."""
+        gone = {entry.takes_back for entry in self.entries}
+        kept = (entry for entry in reversed(self.entries) if not entry.takes_back and entry.number not in gone)
+        return next(kept, None)
+
+    def add(self, entries: Iterable[ToldValue]) -> None:
+        """Enter what was told, or is taken back."""
+        self.entries += entries
+        self._stand()
+        self.version += 1
+        self.revision += 1
+
+    def _stand(self) -> None:
+        """Find what stands."""
+        gone = {entry.takes_back for entry in self.entries}
+        self._standing = self._by_config | {
+            entry.name: entry for entry in self.entries if not entry.takes_back and entry.number not in gone
+        }
+        standing = self._standing.values()
+        self.joints = {pair_of(told.subject): told for told in standing if told.kind is SetupKind.JOINT}
+        self.lengths = {int(told.subject): told for told in standing if told.kind is SetupKind.LENGTH}
+
+    def on_flags(self, tube: int, hops: int, flags: NodeFlag) -> None:
+        """A node says, in a state or a measurement, which angles it was not told."""
+        bits = int(flags)
+        before = self._lowers.get(tube), self._drives.get(tube)
+        self._lowers[tube] = not bits & int(NodeFlag.LOWER_UNTOLD)
+        if hops == 1:
+            self._drives[tube] = not bits & int(NodeFlag.DRIVE_UNTOLD)
+        if before != (self._lowers[tube], self._drives.get(tube)):
+            self.revision += 1
+            self.version += bool(self.joints)  # where an angle stands it matters what the node knows of it
+
+    def node_knows(self, pair: Pair) -> bool | None:
+        """Whether a node was told the angle of a joint; None where none has said so."""
+        upper, lower = pair
+        return self._drives.get(lower) if upper == DRIVE else self._lowers.get(upper)
+
+    def joints_of(self, tubes: Sequence[int]) -> list[Pair]:
+        """Joints that surveys rest on: those of the string (tubes from the top down), and each to the drive head."""
+        tops = [*tubes[:1], *(tube for tube in tubes[1:] if tube in self._drives)]
+        return [*((DRIVE, tube) for tube in tops), *pairwise(tubes)]
+
+
+def pair_of(subject: str) -> Pair:
+    """Tubes of a joint's name, the inverse of ``joint_subject``."""
+    upper, lower = subject.split("-")
+    return DRIVE if upper == "drive" else int(upper), int(lower)
+
+
+def told_by_config(config: GroundConfig) -> Iterable[ToldValue]:
+    """What the configuration of a ground station tells."""
+
+    def told(kind: SetupKind, sigma: float, *values: float, subject: str = "") -> ToldValue:
+        return ToldValue(0, kind, subject, values, sigma, CONFIGURATION, "")
+
+    rad = math.radians
+    if config.north_std_deg is not None:
+        yield told(SetupKind.NORTH, rad(config.north_std_deg), rad(config.north_deg))
+    if config.collar_std_deg is not None:
+        lean = rad(config.collar_inclination_deg or 0.0), rad(config.collar_azimuth_deg or 0.0)
+        yield told(SetupKind.COLLAR, rad(config.collar_std_deg), *lean)
+    if config.stick_up_std_m is not None:
+        yield told(SetupKind.STICK_UP, config.stick_up_std_m, config.stick_up_m)
+    for pair, angle_deg, std_deg in config.joints:
+        yield told(SetupKind.JOINT, rad(std_deg), rad(angle_deg), subject=pair)

@@ -1,0 +1,198 @@
+"""Every item of a setup: its value, how well it is known, from where, and how long ago. No I/O.
+
+What was not told has a default that is wide enough to be true: a yaw below a joint that was not told may be any, and so
+may all yaws while the encoder's zero was not compared with north; the collar leans like the design as well as a rig is
+set up, and an IMU sits in its tube as well as it was mounted.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from groundstation.config import GroundConfig
+from groundstation.service.setup.setup_book import Pair, SetupBook
+from groundstation.service.setup.told_value import CONFIGURATION, DRIVE, SetupKind, ToldValue, item_name, joint_subject
+from groundstation.service.string.known_string import KnownString
+from telemetry.messages import UNKNOWN_YAW_STD
+
+DEG = math.radians(1.0)
+COLLAR_STD = 1.0 * DEG  # each way, of a rig that is set up by eye and level
+MOUNT_TILT_STD = 0.5 * DEG  # of an IMU as it is mounted in its tube, until an alignment has found it
+JOINT_STD = 0.05 * DEG  # of a scribe mark that a node was told; the ground station does not hear its own
+LENGTH_STD = 5e-3  # m, of a tube as it is made
+STICK_UP_STD = 0.1  # m
+DEPTH_SCALE_STD, DEPTH_OFFSET_STD = 1e-3, 0.05  # 1 and m, of the block's position
+PLAY_STD = 0.05 * DEG  # each way, another one at every stop
+PATH_STD = 0.2 * DEG  # rad/m, curvature of a hole between two stations
+GRAVITY_STD = 0.02  # m/s^2, of the Earth's, where the site's is not measured
+ALONG = (SetupKind.LENGTH, SetupKind.STICK_UP, SetupKind.DEPTH_SCALE, SetupKind.DEPTH_OFFSET)  # errors of the depth
+GYROSCOPE_BIAS_STD = 0.02 * DEG  # rad/s; a node measures its own at rest
+
+
+class SetupSource(enum.StrEnum):
+    """Where the value of an item is from."""
+
+    TOLD = "told"  # by an order, the configuration, or to a node
+    MEASURED = "measured"
+    DESIGN = "design"  # of the hole or of the tubes
+    DEFAULT = "default"  # of this program
+
+
+@dataclass(frozen=True, slots=True)
+class SetupItem:
+    """What is known of one item; SI and rad.
+
+    Parameters
+    ----------
+    kind, subject : what it is, and of which tube or joint
+    values : mean, of the collar inclination and azimuth; none where it may be any
+    sigma : standard deviation of each
+    unit : of both: rad, m, m/s^2, rad/s, rad/m or 1
+    source, detail : where it is from, and that in words
+    by, utc : who told it and when; empty where it was not told, or not by an order
+    is_needed : without it no azimuth is known, so that it is missing where it was not told
+    times_told : by orders
+    """
+
+    kind: SetupKind
+    subject: str
+    values: tuple[float, ...]
+    sigma: float
+    unit: str
+    source: SetupSource
+    detail: str
+    by: str = ""
+    utc: str = ""
+    is_needed: bool = False
+    times_told: int = 0
+
+    @property
+    def name(self) -> str:
+        """Name, such as ``north`` and ``joint.4-3``."""
+        return item_name(self.kind, self.subject)
+
+    @property
+    def is_told(self) -> bool:
+        """Whether it was told or measured."""
+        return self.source in (SetupSource.TOLD, SetupSource.MEASURED)
+
+    @property
+    def is_missing(self) -> bool:
+        """Whether the hole cannot be known without it, and it was not told."""
+        return self.is_needed and not self.is_told
+
+
+def setup_items(config: GroundConfig, book: SetupBook, string: KnownString) -> list[SetupItem]:
+    """All items of a rig as they stand; those of tubes from the top down."""
+    return [*_items_of_rig(config, book), *_joint_items(book, string.tubes), *_items_of_tubes(config, book, string)]
+
+
+def shown_marks(book: SetupBook, string: KnownString) -> tuple[object, ...]:
+    """What the items of a rig stand for: others once what is shown of them is another."""
+    states = (string.states.newest[tube] for tube in string.tubes if tube in string.states.newest)
+    return (book.revision, *string.tubes, *((state.alignment, state.parameters_version) for state in states))
+
+
+def missing_names(items: list[SetupItem]) -> list[str]:
+    """Names of the items without which the hole cannot be known."""
+    return [item.name for item in items if item.is_missing]
+
+
+def _items_of_rig(config: GroundConfig, book: SetupBook) -> Iterator[SetupItem]:
+    design = math.radians(config.design_inclination_deg), math.radians(config.design_azimuth_deg)
+    for kind, unit, needed, values, sigma, source, detail in (
+        (SetupKind.NORTH, "rad", True, (), UNKNOWN_YAW_STD, SetupSource.DEFAULT, "not told: any azimuth may be"),
+        (SetupKind.COLLAR, "rad", False, design, COLLAR_STD, SetupSource.DESIGN, "not told: as the design"),
+        (SetupKind.STICK_UP, "m", False, (0.0,), STICK_UP_STD, SetupSource.DEFAULT, "not told"),
+    ):
+        told = book.standing(kind)
+        if told is None:
+            yield SetupItem(
+                kind, "", values, sigma, unit, source, detail, "", "", needed, book.told_before(item_name(kind))
+            )
+        else:
+            yield _told_item(told, unit, book, is_needed=needed)
+    default, rules = SetupSource.DEFAULT, ("not told", "until the residuals of the hole show it")
+    for kind, values, sigma, unit, detail in (
+        (SetupKind.DEPTH_SCALE, (1.0,), DEPTH_SCALE_STD, "1", rules[0]),
+        (SetupKind.DEPTH_OFFSET, (0.0,), DEPTH_OFFSET_STD, "m", rules[0]),
+        (SetupKind.PLAY, (0.0,), PLAY_STD, "rad", rules[1]),
+        (SetupKind.PATH, (0.0,), PATH_STD, "rad/m", rules[1]),
+        (SetupKind.GRAVITY, (config.gravity,), GRAVITY_STD, "m/s^2", CONFIGURATION),
+    ):
+        yield SetupItem(kind, "", values, sigma, unit, default, detail)
+
+
+def _joint_items(book: SetupBook, tubes: list[int]) -> Iterator[SetupItem]:
+    for pair in book.joints_of(tubes):
+        if (item := joint_item(book, pair)) is not None:
+            yield item
+
+
+def joint_item(book: SetupBook, pair: Pair) -> SetupItem | None:
+    """What is known of a joint; None before its node has said whether it was told an angle."""
+    kind, subject, knows = SetupKind.JOINT, joint_subject(*pair), book.node_knows(pair)
+    if (told := book.standing(kind, subject)) is not None:
+        return _told_item(told, "rad", book, is_needed=True)
+    times = book.told_before(item_name(kind, subject))
+    if knows is None:
+        return None
+    node = f"the node of tube {pair[1] if pair[0] == DRIVE else pair[0]}"
+    if knows:
+        detail = f"to {node}, which keeps the angle"
+        return SetupItem(kind, subject, (), JOINT_STD, "rad", SetupSource.TOLD, detail, "", "", True, times)
+    detail = f"{node} was not told: the yaw below may be any"
+    return SetupItem(kind, subject, (), UNKNOWN_YAW_STD, "rad", SetupSource.DEFAULT, detail, "", "", True, times)
+
+
+def _items_of_tubes(config: GroundConfig, book: SetupBook, string: KnownString) -> Iterator[SetupItem]:
+    for tube in string.tubes:
+        yield _length_item(config, book, tube)
+        yield _mount_item(config, string, tube)
+        turn, bias = math.radians(config.mount_std_deg), math.radians(config.accelerometer_bias_std_deg)
+        subject, design = str(tube), SetupSource.DESIGN
+        yield SetupItem(SetupKind.MOUNT_TURN, subject, (0.0,), turn, "rad", design, CONFIGURATION)
+        state = string.states.newest.get(tube)
+        block = "" if state is None or not state.parameters_version else f"block {state.parameters_version}"
+        source = SetupSource.MEASURED if block else design
+        detail = block or "bare sensor"
+        force = bias * config.gravity
+        yield SetupItem(SetupKind.ACCELEROMETER, subject, (0.0,), force, "m/s^2", source, detail)
+        yield SetupItem(SetupKind.GYROSCOPE, subject, (0.0,), GYROSCOPE_BIAS_STD, "rad/s", source, detail)
+
+
+def _length_item(config: GroundConfig, book: SetupBook, tube: int) -> SetupItem:
+    if (told := book.standing(SetupKind.LENGTH, tube)) is not None:
+        return _told_item(told, "m", book)
+    values = (config.tube_length,)
+    return SetupItem(
+        SetupKind.LENGTH, str(tube), values, LENGTH_STD, "m", SetupSource.DESIGN, "as it is made",
+        times_told=book.told_before(item_name(SetupKind.LENGTH, tube)),
+    )  # fmt: skip
+
+
+def _mount_item(config: GroundConfig, string: KnownString, tube: int) -> SetupItem:
+    """Tilt of the IMU against the tube's axis: pitch and roll."""
+    kind, subject, state = SetupKind.MOUNT, str(tube), string.states.newest.get(tube)
+    if state is not None and (std := state.alignment[2]) > 0.0:
+        return SetupItem(
+            kind, subject, state.alignment[:2], std, "rad", SetupSource.MEASURED, "aligned by turning the string"
+        )
+    if config.mount_tilt_std_deg is not None:
+        std = math.radians(config.mount_tilt_std_deg)
+        return SetupItem(kind, subject, (0.0, 0.0), std, "rad", SetupSource.TOLD, CONFIGURATION, CONFIGURATION)
+    detail = "not aligned: as it is mounted"
+    return SetupItem(kind, subject, (0.0, 0.0), MOUNT_TILT_STD, "rad", SetupSource.DESIGN, detail)
+
+
+def _told_item(told: ToldValue, unit: str, book: SetupBook, *, is_needed: bool = False) -> SetupItem:
+    detail = CONFIGURATION if told.number == 0 else f"by {told.by}"
+    if told.used is not None:
+        detail += f", its node computes by {math.degrees(told.used):g} deg"
+    return SetupItem(
+        told.kind, told.subject, told.values, told.sigma, unit, SetupSource.TOLD, detail, told.by, told.utc, is_needed,
+        book.told_before(told.name),
+    )  # fmt: skip

@@ -1,0 +1,145 @@
+"""What an operator tells of the setup: checked, kept on the disk, then entered; taken back by one order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from groundstation.errors import SelectorError
+from groundstation.service.setup.setup_book import Pair, SetupBook
+from groundstation.service.setup.told_value import DRIVE, SetupKind, ToldValue, joint_subject
+from telemetry.application.commands import CommandSpec
+
+
+class SetupStore(Protocol):
+    """Where what was told is kept."""
+
+    def keep_told(self, told: ToldValue) -> None:
+        """Keep an entry; durable on return."""
+
+
+class SetupOrder(Protocol):
+    """An order as it tells something."""
+
+    @property
+    def spec(self) -> CommandSpec:
+        """Its line in the table of commands."""
+
+    @property
+    def tube(self) -> int | None:
+        """Tube that it names."""
+
+    @property
+    def arguments(self) -> dict[str, float]:
+        """What it tells, in SI."""
+
+    @property
+    def by(self) -> str:
+        """Who ordered it."""
+
+    @property
+    def utc(self) -> str:
+        """When."""
+
+
+class SetupOrders:
+    """Orders about the setup of one rig; each returns what is to be said of it.
+
+    Parameters
+    ----------
+    book : that they are entered in
+    store : where they are kept before
+    tubes : of the string, from the top down
+    follow : has the surveys adjusted to what is told now; returns how many there are
+    check : of a collar, beside what the first station says; empty where they agree
+    """
+
+    def __init__(
+        self,
+        book: SetupBook,
+        store: SetupStore,
+        tubes: Callable[[], Sequence[int]],
+        follow: Callable[[], int],
+        check_collar: Callable[[], str],
+    ) -> None:
+        self._book, self._store, self._tubes = book, store, tubes
+        self._follow, self._check_collar = follow, check_collar
+
+    def obey(self, order: SetupOrder) -> str:
+        """Do what an order says; returns what became of it.
+
+        Raises
+        ------
+        SelectorError
+            When what it tells cannot be; nothing was kept.
+        StoreError
+            When the disk refuses; nothing was entered.
+        """
+        if order.spec.name == "setup":
+            return self._enter(self._taken_back(order))
+        kind = SetupKind(order.spec.name)
+        told = order.arguments
+        match kind:
+            case SetupKind.COLLAR:
+                subject, values = "", (told["inclination"], told["azimuth"])
+            case SetupKind.JOINT:
+                subject, values = joint_subject(*self._checked_joint(order)), (told["angle"],)
+            case SetupKind.LENGTH:
+                subject, values = str(order.tube), (told["length"],)
+            case SetupKind.STICK_UP:
+                subject, values = "", (told["height"],)
+            case _:
+                subject, values = "", (told["angle"],)
+        number = self._book.next_number()
+        entry = ToldValue(number, kind, subject, values, told["sigma"], order.by, order.utc, told.get("used"))
+        before = self._book.standing(kind, subject)
+        detail = self._enter(entry)
+        if before is not None and (before.values, before.sigma) != (entry.values, entry.sigma):
+            detail = f"{detail}; before it was {shown_value(before)} by {before.by}, which is kept too"
+        doubt = self._check_collar() if kind is SetupKind.COLLAR else ""
+        return f"{detail}; {doubt}" if doubt else detail
+
+    def _enter(self, entry: ToldValue) -> str:
+        self._store.keep_told(entry)
+        self._book.add([entry])
+        surveys = self._follow()
+        done = f"{entry.name} is taken back" if entry.takes_back else f"{entry.name} is {shown_value(entry)}"
+        return f"{done}; {surveys} surveys were adjusted to it" if surveys else done
+
+    def _taken_back(self, order: SetupOrder) -> ToldValue:
+        newest, number = self._book.newest(), self._book.next_number()
+        if newest is None:
+            raise SelectorError("setup: expected something that an order told, there is nothing to take back")
+        return ToldValue(
+            number, newest.kind, newest.subject, (), newest.sigma, order.by, order.utc, takes_back=newest.number
+        )
+
+    def _checked_joint(self, order: SetupOrder) -> Pair:
+        """The joint at the upper end of the tube that an order names."""
+        tubes, lower, used = list(self._tubes()), order.tube or 0, order.arguments.get("used")
+        place = tubes.index(lower) if lower in tubes else 0
+        above = tubes[place - 1] if place else DRIVE
+        upper = int(order.arguments.get("upper", above))
+        subject = joint_subject(upper, lower)
+        if upper not in (above, DRIVE):
+            known = f"joint {joint_subject(above, lower)} above tube {lower}, or upper=0 for the drive head"
+            raise SelectorError(f"joint {subject}: expected {known}")
+        knows, teller = self._book.node_knows((upper, lower)), lower if upper == DRIVE else upper
+        if knows is None:
+            never = "hung from the drive head in a survey" if upper == DRIVE else "said which angles it was told"
+            raise SelectorError(f"joint {subject}: expected a tube that has spoken, tube {teller} has not {never}")
+        if knows and used is None:
+            told = f"the node of tube {teller} was told its angle, which is in every yaw below"
+            raise SelectorError(f"joint {subject}: {told}; expected used_deg=.. as it was told")
+        if not knows and used is not None:
+            raise SelectorError(f"joint {subject}: the node of tube {teller} was told no angle; expected no used_deg")
+        return upper, lower
+
+
+def shown_value(told: ToldValue) -> str:
+    """A value with its standard deviation and unit, for people."""
+    is_length = told.kind in (SetupKind.LENGTH, SetupKind.STICK_UP)
+    scale, unit = (1.0, "m") if is_length else (math.degrees(1.0), "deg")
+    values = " to ".join(f"{scale * value:g}" for value in told.values)
+    return f"{values} ± {scale * told.sigma:g} {unit}"

@@ -1,0 +1,64 @@
+"""The setup as the priors of an adjustment: means and standard deviations by name, and the direction at the collar."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from groundstation.config import GroundConfig
+from groundstation.service.setup.setup_book import SetupBook
+from groundstation.service.setup.setup_items import COLLAR_STD, SetupItem
+from groundstation.service.setup.told_value import SetupKind
+from groundstation.survey.fusion.resolve import Direction, known_direction
+
+
+@dataclass(frozen=True, slots=True)
+class SetupPrior:
+    """What is known of one item before any survey; SI and rad.
+
+    ``mean`` is empty where the item may have any value, as an angle that was not told; ``sigma`` is of each number.
+    """
+
+    kind: SetupKind
+    subject: str
+    mean: tuple[float, ...]
+    sigma: float
+    is_told: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SetupPriors:
+    """Priors by the names of their items, such as ``north``, ``joint.4-3`` and ``mount.3``.
+
+    ``version`` is that of the book they are from: with another version surveys are to be adjusted anew.
+    """
+
+    version: int
+    by_name: Mapping[str, SetupPrior]
+
+
+def setup_priors(items: Iterable[SetupItem], version: int = 0) -> SetupPriors:
+    """Priors of all items of a setup."""
+    by_name = {one.name: SetupPrior(one.kind, one.subject, one.values, one.sigma, one.is_told) for one in items}
+    return SetupPriors(version, by_name)
+
+
+def collar_direction(config: GroundConfig, book: SetupBook) -> Direction:
+    """Direction of the hole at the collar as well as it is known: told, or that of the design."""
+    told = book.standing(SetupKind.COLLAR)
+    if told is None:
+        return uncertain_direction(
+            math.radians(config.design_inclination_deg), math.radians(config.design_azimuth_deg), COLLAR_STD
+        )
+    return uncertain_direction(*told.values, told.sigma)
+
+
+def uncertain_direction(inclination: float, azimuth: float, std: float) -> Direction:
+    """A direction (rad) that is known with a standard deviation (rad) each way."""
+    along = np.array([math.cos(azimuth), math.sin(azimuth)])
+    across = np.array([-along[1], along[0]])
+    lean_cov = math.cos(inclination) ** 2 * np.outer(along, along) + np.outer(across, across)
+    return replace(known_direction(inclination, azimuth), cov=std**2 * lean_cov)

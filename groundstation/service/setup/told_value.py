@@ -1,0 +1,116 @@
+"""One value of the setup as it was told: by an order, kept as text, or by the configuration of the ground station."""
+
+from __future__ import annotations
+
+import enum
+import json
+import math
+import re
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+from groundstation.errors import GroundError
+
+CONFIGURATION = "configuration"  # tells what stands in the options of the ground station
+NO_SUBJECT: Final = re.compile("")
+DRIVE = 0  # stands for the drive head among the tubes of a pair
+
+
+class SetupKind(enum.StrEnum):
+    """What is known of a setup; the first five can be told."""
+
+    NORTH = "north"
+    COLLAR = "collar"
+    JOINT = "joint"
+    LENGTH = "length"
+    STICK_UP = "stick_up"
+    MOUNT = "mount"
+    MOUNT_TURN = "mount_turn"
+    DEPTH_SCALE = "depth_scale"
+    DEPTH_OFFSET = "depth_offset"
+    ACCELEROMETER = "accelerometer"
+    GYROSCOPE = "gyroscope"
+    PLAY = "play"
+    PATH = "path"
+    GRAVITY = "gravity"
+
+
+SUBJECTS: Final = {
+    SetupKind.JOINT: re.compile(r"([0-9]{1,3}|drive)-[0-9]{1,3}"),
+    SetupKind.LENGTH: re.compile(r"[0-9]{1,3}"),
+}
+
+
+class DamagedSetupError(GroundError, ValueError):
+    """A stored text is no value of a setup."""
+
+
+@dataclass(frozen=True, slots=True)
+class ToldValue:
+    """A value with its standard deviation, and who told it; SI and rad.
+
+    Parameters
+    ----------
+    number : from 1 in the order of telling; 0 of the configuration
+    kind, subject : what it is, and of which tube or joint, such as ``3`` and ``4-3``
+    values : one, or of the collar inclination and azimuth; none in an entry that takes another back
+    sigma : of each, larger than zero
+    used : rad, angle by which the node computed; None where it was told none
+    by, utc : who told it and when
+    takes_back : number of the entry that does not stand any more
+    """
+
+    number: int
+    kind: SetupKind
+    subject: str
+    values: tuple[float, ...]
+    sigma: float
+    by: str
+    utc: str
+    used: float | None = None
+    takes_back: int = 0
+
+    @property
+    def name(self) -> str:
+        """Name of the item that it tells."""
+        return item_name(self.kind, self.subject)
+
+    @property
+    def correction(self) -> float:
+        """Angle (rad) to be added to a yaw below a joint."""
+        return self.values[0] - (self.used or 0.0)
+
+
+def item_name(kind: SetupKind, subject: object = "") -> str:
+    """Name of an item, such as ``north``, ``length.3`` and ``joint.4-3``."""
+    return f"{kind.value}.{subject}" if subject != "" else kind.value
+
+
+def joint_subject(upper: int, lower: int) -> str:
+    """A joint by its tubes, such as ``4-3``, or ``drive-4``."""
+    return f"{'drive' if upper == DRIVE else upper}-{lower}"
+
+
+def told_to_text(told: ToldValue) -> str:
+    """The value as it is stored."""
+    return json.dumps(asdict(told))
+
+
+def told_of_text(text: str) -> ToldValue:
+    """The value of a stored text.
+
+    Raises
+    ------
+    DamagedSetupError
+        When it is none.
+    """
+    try:
+        row: dict[str, Any] = json.loads(text)
+        told = ToldValue(**row | {"kind": SetupKind(row["kind"]), "values": tuple(map(float, row["values"]))})
+    except (ValueError, TypeError, KeyError) as error:
+        raise DamagedSetupError(f"expected a value of the setup, got {text:.60}") from error
+    if SUBJECTS.get(told.kind, NO_SUBJECT).fullmatch(told.subject) is None or not (told.values or told.takes_back):
+        raise DamagedSetupError(f"expected a value of the setup, got {text:.60}")
+    if not all(map(math.isfinite, (*told.values, told.sigma, told.used or 0.0))):
+        raise DamagedSetupError(f"expected finite numbers of the setup, got {text:.60}")
+    return told

@@ -1,0 +1,65 @@
+"""The setup on the page: what is missing in red, what it costs, and the form that tells it, by role."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+from beating import Beating, beating
+from page_client import PASSWORD
+from playwright.sync_api import Page, expect
+
+pytestmark = pytest.mark.slow
+Open = Callable[..., Page]
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Beating]:
+    """A rig whose crew has not told north, nor whether its mounts are aligned."""
+    untold = {"north_std_deg": None, "mount_tilt_std_deg": None}
+    with beating(tmp_path_factory.mktemp("ground"), (0.3, 0.3, 0.3), **untold) as rig:
+        yield rig
+
+
+def test_what_is_missing_is_named_told_by_a_driller_and_taken_back(rig: Beating, watched: Open) -> None:
+    page = watched(rig.url)
+    expect(page.locator("#word")).to_have_text("DON'T KNOW")
+    expect(page.locator("#told")).to_have_text("not told: north")
+    expect(page.locator("#ready")).to_have_text("NOT READY TO DRILL, not told: north")
+    expect(page.locator("#next")).to_contain_text("Next: tell north")
+    first = page.locator("#setup-items tr").first
+    expect(first).to_have_class("grave")
+    expect(first.locator("td").nth(2)).to_have_text("any")
+
+    page.fill("#tell-angle_deg", "12.5")
+    page.fill("#tell-sigma_deg", "0.3")
+    page.click("#tell button[type=submit]")
+    page.fill("#who", "anna")
+    page.fill("#password", PASSWORD)
+    page.click("#sign-now")
+    expect(page.locator("#ready")).to_have_text("Ready to drill: north and every joint are told")
+    expect(page.locator("#word")).to_have_text("ON TARGET")
+    expect(page.locator("#next")).to_contain_text("align tube 3")
+    told = page.locator("#setup-items tr", has_text="north")
+    expect(told).to_contain_text("told: by anna")
+    expect(told).to_contain_text("0 min")
+    expect(page.locator("#orders")).to_contain_text("north is 12.5 ± 0.3 deg; 3 surveys were adjusted to it")
+
+    page.click("#take-back")
+    expect(page.locator("#ready")).to_have_text("NOT READY TO DRILL, not told: north")
+
+
+def test_the_form_asks_for_what_an_order_needs_and_shows_what_is_refused(rig: Beating, watched: Open) -> None:
+    page = watched(rig.url)
+    page.select_option("#tell-kind", "joint")
+    assert page.locator("#tell-fields input").evaluate_all("(inputs) => inputs.map((one) => one.name)") == [
+        "tube", "angle_deg", "sigma_deg", "used_deg", "upper",
+    ]  # fmt: skip
+    for name, value in (("tube", "1"), ("angle_deg", "5"), ("sigma_deg", "0.1")):
+        page.fill(f"#tell-{name}", value)
+    page.click("#tell button[type=submit]")
+    page.fill("#who", "anna")
+    page.fill("#password", PASSWORD)
+    page.click("#sign-now")
+    expect(page.locator("#message")).to_contain_text("joint 2-1: the node of tube 2 was told its angle")
+    expect(page.locator("#message")).to_contain_text("expected used_deg=..")
