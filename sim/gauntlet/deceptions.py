@@ -12,12 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.gauntlet.fault import TUBES, Act, Draw, Faulty, Step, drawn_tube
-from sim.gauntlet.faulty_world import Reading
+from sim.gauntlet.faulty_world import TUBE_LENGTH, Reading
 from sim.world.truth import imu_frame
 
 Array = npt.NDArray[np.float64]
 MILLI_G = 9.80665e-3  # m/s^2
 DOWN_FOR = 3.0  # s without power, in which a tube is given other settings
+ACTION = {"north": {"action": "tell"}, "collar": {"action": "tell"}}
 
 
 def deceive_from(name: str, act: Callable[[np.random.Generator], Act]) -> Draw:
@@ -132,3 +133,35 @@ def joint_misread(random: np.random.Generator, begin: float, end: float) -> list
         rig.cut(top)
 
     return [Step(at, cut), Step(at + DOWN_FOR, lambda rig: rig.start(top))]
+
+
+def tell_wrongly(name: str, parameters_of: Callable[[np.random.Generator], dict[str, float]]) -> Draw:
+    """Draw of an order of the crew that tells what is not so; a ground station without power hears none."""
+
+    def draw(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+        at, told = float(random.uniform(begin, end)), parameters_of(random)
+        order = name.partition("-")[0]
+
+        def tell(rig: Faulty) -> None:
+            if rig.order(order, {key: f"{value:g}" for key, value in told.items()} | ACTION.get(order, {})):
+                rig.world.deceptions.add(name)
+
+        return [Step(at, tell)]
+
+    return draw
+
+
+def north_wrong(random: np.random.Generator) -> dict[str, float]:
+    """North is told wrong by 5 to 120 deg."""
+    return {"angle_deg": float(random.uniform(5.0, 120.0)), "sigma_deg": 0.5}
+
+
+def collar_wrong(random: np.random.Generator) -> dict[str, float]:
+    """The collar is told to lean by up to 10 deg, any way."""
+    lean, azimuth = random.uniform([0.0, -180.0], [10.0, 180.0]).tolist()
+    return {"inclination_deg": lean, "azimuth_deg": azimuth, "sigma_deg": 0.1}
+
+
+def length_wrong(random: np.random.Generator) -> dict[str, float]:
+    """The lower tube is told to be 0.1 to 0.5 m longer than it is."""
+    return {"tube": 1, "length_m": TUBE_LENGTH + float(random.uniform(0.1, 0.5)), "sigma_m": 0.002}

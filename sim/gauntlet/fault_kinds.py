@@ -104,6 +104,14 @@ KINDS: tuple[FaultKind, ...] = (
         )
     ),
     FaultKind("joint-misread", "a mark of the top tube is told wrong by 3 to 30 deg", deceptions.joint_misread),
+    *(
+        FaultKind(name, meaning, deceptions.tell_wrongly(name, parameters_of))
+        for name, meaning, parameters_of in (
+            ("north-wrong", "north is told wrong by 5 to 120 deg", deceptions.north_wrong),
+            ("collar-wrong", "the collar is told to lean by up to 10 deg", deceptions.collar_wrong),
+            ("length-wrong", "a tube is told to be 0.1 to 0.5 m longer than it is", deceptions.length_wrong),
+        )
+    ),
 )
 KIND_OF = {kind.name: kind for kind in KINDS}
 LASTING = frozenset({"encoder-slips", *EXPECTED})  # that no repair of a crew takes back

@@ -72,6 +72,20 @@ def test_a_deception_of_depths_moves_what_is_said_of_them(
     assert max(off) > least_m
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["north-wrong", "collar-wrong", "length-wrong"])
+def test_what_the_crew_tells_wrongly_is_entered(kind: str, tmp_path_factory: pytest.TempPathFactory) -> None:
+    for seed in SEEDS:
+        rig = drilled(kind, seed, tmp_path_factory.mktemp(kind))
+        assert kind in rig.world.deceptions
+        item = kind.partition("-")[0]
+        told = [
+            row for row in rig.inline.ask("setup")["items"] if row["item"].partition(".")[0] == item and row["told"]
+        ]
+        assert len(told) == 1
+        rig.close()
+
+
 def test_a_hole_that_leans_over_is_read_as_it_leans() -> None:
     world = FaultyWorld.of_tables(MINUTE, 1).healthy()
     cycle = 150

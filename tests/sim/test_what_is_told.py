@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sim.rig.ground_settings import ground_settings
 from sim.world.marks import wrap_angle
 from sim.world.scenario import scenario_of
 from sim.world.world import World
@@ -60,6 +61,19 @@ def test_its_edges_pass_where_the_head_is() -> None:
         head = float(world.motion.drive(np.array([at]))[0][0])
         shown = math.radians((count - back) * 360.0 / 4096)
         assert head - shown == pytest.approx(math.radians(33.0), abs=math.radians(0.04))
+
+
+def test_a_collar_is_told_to_lean_otherwise() -> None:
+    honest, wrong = ground_settings(world_of()), ground_settings(told(collar_north_deg=0.5, collar_east_deg=-0.3))
+    leans = []
+    for settings in (honest, wrong):
+        inclination, azimuth = (math.radians(settings[f"collar_{name}_deg"]) for name in ("inclination", "azimuth"))
+        leans.append(math.tan(inclination) * np.array([math.cos(azimuth), math.sin(azimuth)]))
+    expected = np.tan(np.radians(10.0)) * np.array([math.cos(math.radians(20.0)), math.sin(math.radians(20.0))])
+    np.testing.assert_allclose(leans[0], expected, atol=1e-12)
+    np.testing.assert_allclose((leans[1] - leans[0]) * math.cos(math.radians(10.0)), np.radians([0.5, -0.3]), atol=1e-9)
+    changed = {key for key in honest if honest[key] != wrong[key]}
+    assert changed == {"collar_inclination_deg", "collar_azimuth_deg"}
 
 
 def test_a_tube_that_is_longer_lifts_those_above_it() -> None:
