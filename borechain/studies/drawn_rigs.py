@@ -55,7 +55,7 @@ class RigDraw:
     kind: HoleKind
     stops_anywhere: bool = True
     inclination_deg: float = 2.0
-    azimuth_deg: float = 250.0
+    azimuth_deg: float = -110.0
 
 
 def tables_of(draw: RigDraw) -> Tables:
