@@ -7,10 +7,10 @@ are left out, so that a rig of ten tubes costs a second.
 
 from __future__ import annotations
 
-import itertools
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from operator import attrgetter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -32,7 +32,7 @@ from telemetry.presentation.msgpack_codec import encode_message
 
 RIG: Final = "study"
 EPOCH: Final = 1
-STATE_EVERY: Final = 20  # cycles
+STATE_EVERY: Final = 4  # cycles
 Heard = NodeState | SurveyMeasurement | Event
 
 
@@ -78,7 +78,10 @@ def tell_ground(ground: GroundProcess, world: World, run: StringRun) -> None:
 def messages_by_cycle(run: StringRun) -> dict[int, list[Heard]]:
     """What the nodes said, by the cycle in which they did: states, so that their order is known, before surveys."""
     found: dict[int, list[Heard]] = defaultdict(list)
-    surveys = [(survey.said, survey.measurement) for survey in (*run.surveys, *run.revisions)]
-    for cycle, message in itertools.chain(run.states, run.events, sorted(surveys, key=lambda one: one[0])):
-        found[cycle].append(message)
+    for cycle, state in run.states:
+        found[cycle].append(state)
+    for cycle, event in run.events:
+        found[cycle].append(event)
+    for survey in sorted((*run.surveys, *run.revisions), key=attrgetter("said")):
+        found[survey.said].append(survey.measurement)
     return found

@@ -95,7 +95,8 @@ def look_equations(
     def force(values: Array, play: Array) -> Array:
         lean = looks.tangents[station] + values[:2] @ bases[station]
         gravity, yaw = spread.gravity + values[8], looks.yaw[look] - values[7]
-        return gravity * seen_up(lean / np.linalg.norm(lean), yaw, values[5:7] + play) + values[2:5]
+        felt = gravity * seen_up(lean / np.linalg.norm(lean), yaw, values[5:7] + play)
+        return np.asarray(felt + values[2:5])
 
     nothing, still = np.zeros(9), np.zeros(2)
     here = force(nothing, still)
@@ -121,7 +122,7 @@ def seen_up(direction: Array, yaw: float, tilt: Array) -> Array:
     c, s = math.cos(yaw), math.sin(yaw)
     north, east, down = direction.tolist()
     felt = np.array([c * north + s * east, c * east - s * north, -down])
-    return felt + np.cross([tilt[0], tilt[1], 0.0], felt)
+    return np.asarray(felt + np.cross([tilt[0], tilt[1], 0.0], felt))
 
 
 def axes_across(tangents: Array) -> Array:
@@ -140,7 +141,7 @@ def path_covariance(md: Array, collar_std: float, curvature_std: float, length: 
     bent = 2.0 * length * low - length**2 * (
         1.0 - np.exp(-low / length) - np.exp(-high / length) + np.exp(-(high - low) / length)
     )
-    return np.kron(collar_std**2 + curvature_std**2 * bent, np.eye(2))
+    return np.asarray(np.kron(collar_std**2 + curvature_std**2 * bent, np.eye(2)), np.float64)
 
 
 def best_of_rig(world: World, hole: SurveyedHole, config: GroundConfig, known: KnownSetUp) -> Array:
@@ -180,7 +181,7 @@ def best_of_rig(world: World, hole: SurveyedHole, config: GroundConfig, known: K
         gravity,
     )
     variances = np.diag(best_direction_cov(looks, spread)).reshape(-1, 2)
-    return np.sqrt(variances.mean(axis=1))
+    return np.asarray(np.sqrt(variances.mean(axis=1)))
 
 
 def look_rows(station: SurveyStation) -> list[tuple[float, ...]]:

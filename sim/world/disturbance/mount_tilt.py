@@ -29,7 +29,9 @@ def lean_samples(samples: ImuSamples, _: OneImu, tilt: Tilt) -> None:
 
 def tilt_gains(tilt: Tilt, _: ScenarioFile) -> Array:
     """What the sensor shows, (6, 6)."""
-    return np.kron(np.eye(2), imu_frame(*tilt))
+    shown = np.zeros((6, 6))
+    shown[:3, :3] = shown[3:, 3:] = imu_frame(*tilt)
+    return shown
 
 
 MOUNT_TILT = Disturbance(
