@@ -86,7 +86,9 @@ EXACT: dict[str, Tables] = {
     "play": disturbed("play", sigma_deg=0.5, bow_deg=0.5),
     "mount-slip": disturbed("mount-slip", after_s=70.0, pitch_deg=2.0, roll_deg=-3.0, turn_deg=10.0),
     "force-step": disturbed("force-step", after_s=80.0, step_mg=(1.0, -2.0, 3.0), creep_mg_per_s=(0.1, 0.2, -0.3)),
-    "calibration-exchanged": disturbed("calibration-exchanged", raw_mg=20.0),
+    "calibration-exchanged": change_sections(
+        disturbed("calibration-exchanged", raw_mg=20.0), rig={"tubes": 2, "tubes_at_start": 2}
+    ),
     "axes-exchanged": disturbed("axes-exchanged", after_s=80.0),
 }
 DRAWN_ANEW: dict[str, tuple[Tables, ...]] = {
@@ -283,6 +285,7 @@ BESIDE: dict[str, dict[str, Any]] = {
     "path.drawn.": {"path": {"straight": None, "drawn": {}}},
     "path.moved.": {"path": {"moved": MOVED}},
     "told.joint_tube": {"told": {"joint_deg": 5.0}},
+    "told.joint_deg": {"told": {"joint_tube": 2}},
     "told.depth_stuck_s": {"told": {"depth_stuck_after_s": 10.0}},
     "torsion": {"schedule": {"stop_s": 40.0}},
     "aiding.on_s": {"aiding": {"off_s": 10.0}},
