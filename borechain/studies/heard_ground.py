@@ -33,6 +33,7 @@ from telemetry.presentation.msgpack_codec import encode_message
 RIG: Final = "study"
 EPOCH: Final = 1
 STATE_EVERY: Final = 4  # cycles
+IN_ONE: Final[Mapping[str, Any]] = {"weighting": "adjusted"}  # settings by which the hole is adjusted in one
 Heard = NodeState | SurveyMeasurement | Event
 
 

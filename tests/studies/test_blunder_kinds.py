@@ -3,7 +3,7 @@
 import pytest
 
 from borechain.studies.blunders.answer_given import AnswerGiven
-from borechain.studies.blunders.kinds import KINDS, BlunderKind
+from borechain.studies.blunders.kinds import KINDS, PlantedBlunder
 from borechain.studies.blunders.run import BlunderJob, BlunderRun, outcome_of, tables_with
 from borechain.studies.drawn_rigs import KnownSetUp, drawn_rigs, tables_of
 from sim.world.path_section import HOLE_KINDS
@@ -19,7 +19,7 @@ def test_there_are_enough_kinds_in_three_sizes() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_a_kind_changes_the_scenario_of_a_rig(kind: BlunderKind) -> None:
+def test_a_kind_changes_the_scenario_of_a_rig(kind: PlantedBlunder) -> None:
     draw = drawn_rigs(KnownSetUp(), 1)[0]
     honest = scenario_of(dict(tables_of(draw))).file
     for size in range(3):

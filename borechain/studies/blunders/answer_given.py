@@ -19,7 +19,7 @@ class AnswerGiven:
     word : of the verdict
     doubts : of the verdict
     alarms : codes of alarms of the rig that were raised at any time, but for those of every rig at its end
-    causes : kinds of the best explanations of what the looks contradict, such as ``accelerometer``
+    causes : kinds of the best explanations of what the looks contradict, see ``groundstation.survey.adjustment.hypotheses``
     """
 
     word: str
@@ -37,12 +37,9 @@ def answer_of(ground: GroundProcess) -> AnswerGiven:
     """Answer of a ground station as it stands."""
     verdict, alarms = ground.operator.ask("verdict"), ground.operator.ask("alarms")
     codes = {row["code"] for key in ("rig", "rig_cleared") for row in alarms[key]}
+    found = ground.operator.ask("adjustment")["blunders"]
+    left_open = ("left_open",) if any(row["is_doubt"] for row in found) else ()
+    causes = tuple(row["kind"] for row in found if not row["is_doubt"])
     return AnswerGiven(
-        verdict["verdict"], tuple(verdict["doubts"]), tuple(sorted(codes - USUAL_ALARMS)), blamed_causes(ground)
+        verdict["verdict"], (*verdict["doubts"], *left_open), tuple(sorted(codes - USUAL_ALARMS)), causes
     )
-
-
-def blamed_causes(ground: GroundProcess) -> tuple[str, ...]:
-    """Kinds of causes that the adjustment of the hole names; none before it can."""
-    del ground
-    return ()

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from borechain.studies.drawn_rigs import TUBES, change_tables
+from groundstation.survey.adjustment.hypotheses import BlunderKind
 from sim.studies.scenarios import Tables
 
 MIDDLE_S: Final = 640.0  # after the start
@@ -19,7 +20,7 @@ Change = Callable[[Tables, float], Tables]
 
 
 @dataclass(frozen=True, slots=True)
-class BlunderKind:
+class PlantedBlunder:
     """One kind.
 
     Attributes
@@ -89,113 +90,118 @@ def in_field(tables: Tables, **keys: dict[str, Any]) -> Tables:
     return change_tables(tables, rough={"samples_hz": 50.0, **keys})
 
 
-BIAS, MOUNT, JOINT, AXES = ("accelerometer",), ("mount",), ("joint", "north"), ("axes", "accelerometer")
-DEPTH: Final = ("depth",)
-KINDS: Final[tuple[BlunderKind, ...]] = (
-    BlunderKind(
+K = BlunderKind
+BIAS = (K.BIAS_STEPPED, K.BIAS_CREEPS, K.BIAS_WRONG, K.TILT_SLIPPED, K.TILT_WRONG)  # across a tube they look alike
+MOUNT = (K.MOUNT_TURNED, K.MOUNT_MISREAD)
+JOINT = (K.JOINT_MISREAD, K.JOINT_SLIPPED, K.MOUNT_MISREAD)
+TURN = (K.ENCODER_SLIPPED, K.JOINT_SLIPPED, K.JOINT_MISREAD)
+AXES = (K.AXES_EXCHANGED,)
+DEPTH = (K.DEPTH_WRONG_ONCE, K.DEPTH_WRONG_FROM)
+KINDS: Final[tuple[PlantedBlunder, ...]] = (
+    PlantedBlunder(
         "accelerometer steps across", "mg", (0.3, 3.0, 30.0),
         of_disturbance("force-step", lambda mg: {"step_mg": (mg, 0.0, 0.0)}), BIAS,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "accelerometer steps along", "mg", (0.3, 3.0, 30.0),
         of_disturbance("force-step", lambda mg: {"step_mg": (0.0, 0.0, mg)}), BIAS,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "accelerometer of the bit steps", "mg", (0.3, 3.0, 30.0),
         of_disturbance("force-step", lambda mg: {"tube": 1, "step_mg": (0.0, mg, 0.0)}), BIAS,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "accelerometer of the bit steps at the last stop", "mg", (0.3, 3.0, 30.0),
         of_disturbance("force-step", lambda mg: {"tube": 1, "after_s": 1450.0, "step_mg": (mg, mg, 0.0)}), BIAS,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "accelerometer creeps", "mg/s", (0.001, 0.01, 0.3),
         of_disturbance("force-step", lambda mg: {"creep_mg_per_s": (mg, 0.0, 0.0)}), BIAS,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "mount leans over", "deg", (0.05, 0.5, 5.0),
-        of_disturbance("mount-slip", lambda deg: {"pitch_deg": deg}), (*MOUNT, *BIAS),
+        of_disturbance("mount-slip", lambda deg: {"pitch_deg": deg}), BIAS,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "mount turns", "deg", (0.5, 5.0, 45.0),
-        of_disturbance("mount-slip", lambda deg: {"turn_deg": deg}), (*MOUNT, *JOINT),
+        of_disturbance("mount-slip", lambda deg: {"turn_deg": deg}), MOUNT,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "mount was never as stated", "deg", (1.0, 3.0, 10.0),
-        of_disturbance("mount-slip", lambda deg: {"after_s": 0.0, "pitch_deg": deg}), (*MOUNT, *BIAS),
+        of_disturbance("mount-slip", lambda deg: {"after_s": 0.0, "pitch_deg": deg}), BIAS,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "axes exchanged, tube", "", (2.0, 4.0, 8.0),
         lambda tables, tube: change_tables(tables, disturbance={"axes-exchanged": {"tube": int(tube)}}), AXES,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "axes exchanged in the middle, tube", "", (2.0, 3.0, 5.0),
         lambda tables, tube: change_tables(
             tables, disturbance={"axes-exchanged": {"tube": int(tube), "after_s": MIDDLE_S}}
         ), AXES,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "tubes exchanged in the tally", "mg", (5.0, 20.0, 60.0),
         of_section("disturbance", lambda mg: {"calibration-exchanged": {"tubes": (3, 5), "raw_mg": mg}}),
-        (*BIAS, *MOUNT),
+        (*BIAS, K.TUBES_EXCHANGED),
     ),
-    BlunderKind(
+    PlantedBlunder(
         "joint misread", "deg", (0.5, 5.0, 60.0),
         of_told(lambda deg: {"joint_tube": TUBE, "joint_deg": deg}), JOINT,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "joint to the head misread", "deg", (0.5, 5.0, 60.0),
         of_told(lambda deg: {"joint_tube": TUBE, "drive_deg": deg}), JOINT,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "last joint to the head misread", "deg", (0.5, 5.0, 60.0),
         of_told(lambda deg: {"joint_tube": TUBES, "drive_deg": deg}), JOINT,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "joints untold", "", (0.0, 1.0, 2.0),
         of_section("setup", lambda _: {"untold": ("joints",)}), JOINT,
     ),
-    BlunderKind("north wrong", "deg", (1.0, 5.0, 90.0), of_told(lambda deg: {"north_deg": deg}), JOINT),
-    BlunderKind(
+    PlantedBlunder("north wrong", "deg", (1.0, 5.0, 90.0), of_told(lambda deg: {"north_deg": deg}), JOINT),
+    PlantedBlunder(
         "north untold", "", (0.0, 1.0, 2.0), of_section("setup", lambda _: {"untold": ("north",)}), JOINT
     ),
-    BlunderKind(
-        "collar wrong", "deg", (0.5, 2.0, 8.0), of_told(lambda deg: {"collar_north_deg": deg}), ("collar",)
+    PlantedBlunder(
+        "collar wrong", "deg", (0.5, 2.0, 8.0), of_told(lambda deg: {"collar_north_deg": deg})
     ),
-    BlunderKind(
+    PlantedBlunder(
         "collar untold", "", (0.0, 1.0, 2.0),
-        of_section("setup", lambda _: {"untold": ("collar",)}), ("collar",),
+        of_section("setup", lambda _: {"untold": ("collar",)}),
     ),
-    BlunderKind(
+    PlantedBlunder(
         "tube longer", "m", (0.02, 0.1, 0.5),
-        of_told(lambda m: {"lengths_off_m": of_tube(TUBE, m)}), ("length", *DEPTH),
+        of_told(lambda m: {"lengths_off_m": of_tube(TUBE, m)}), DEPTH,
     ),
-    BlunderKind("depth scale", "", (0.002, 0.02, 0.1), of_told(lambda part: {"depth_scale": part}), DEPTH),
-    BlunderKind("stick-up wrong", "m", (0.05, 0.3, 2.0), of_told(lambda m: {"depth_offset_m": m}), DEPTH),
-    BlunderKind(
+    PlantedBlunder("depth scale", "", (0.002, 0.02, 0.1), of_told(lambda part: {"depth_scale": part}), DEPTH),
+    PlantedBlunder("stick-up wrong", "m", (0.05, 0.3, 2.0), of_told(lambda m: {"depth_offset_m": m}), DEPTH),
+    PlantedBlunder(
         "depth stuck", "s", (20.0, 60.0, 150.0),
         of_told(lambda s: {"depth_stuck_after_s": MIDDLE_S, "depth_stuck_s": s}), DEPTH,
     ),
-    BlunderKind("depth errs at every stop", "m", (0.01, 0.05, 0.2), of_told(lambda m: {"depth_std_m": m}), DEPTH),
-    BlunderKind("hole moves at two stations", "deg", (0.02, 0.1, 1.0), of_section("path", moved_stretch), ("hole",)),
-    BlunderKind(
+    PlantedBlunder("depth errs at every stop", "m", (0.01, 0.05, 0.2), of_told(lambda m: {"depth_std_m": m}), DEPTH),
+    PlantedBlunder("hole moves at two stations", "deg", (0.02, 0.1, 1.0), of_section("path", moved_stretch), (K.HOLE_MOVED,)),
+    PlantedBlunder(
         "belt slips", "", (1e-4, 1e-3, 1e-2),
-        lambda tables, part: in_field(tables, encoder={"belt_slip": part}), ("turn", *JOINT),
+        lambda tables, part: in_field(tables, encoder={"belt_slip": part}), TURN,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "encoder jumps", "deg", (0.5, 5.0, 60.0),
-        lambda tables, deg: in_field(tables, encoder={"jump_deg": deg, "jump_s": MIDDLE_S}), ("turn", *JOINT),
+        lambda tables, deg: in_field(tables, encoder={"jump_deg": deg, "jump_s": MIDDLE_S}), TURN,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "joints slip at make-ups", "deg", (0.1, 1.0, 5.0),
-        of_section("joints", lambda deg: {"unseen_std_deg": deg}), ("turn", *JOINT),
+        of_section("joints", lambda deg: {"unseen_std_deg": deg}), TURN,
     ),
-    BlunderKind(
+    PlantedBlunder(
         "more play than stated", "deg", (0.05, 0.2, 1.0),
-        of_section("disturbance", lambda deg: {"play": {"sigma_deg": deg}}), ("play",),
+        of_section("disturbance", lambda deg: {"play": {"sigma_deg": deg}}),
     ),
-    BlunderKind(
+    PlantedBlunder(
         "bias of a gyroscope steps", "deg/s", (0.01, 0.1, 1.0),
-        of_section("gyroscope", lambda dps: {"bias_step_dps": dps}), ("turn",),
+        of_section("gyroscope", lambda dps: {"bias_step_dps": dps}), TURN,
     ),
 )  # fmt: skip

@@ -15,9 +15,9 @@ from typing import Any, Final
 import numpy as np
 
 from borechain.studies.blunders.answer_given import AnswerGiven, answer_of
-from borechain.studies.blunders.kinds import KINDS, BlunderKind
+from borechain.studies.blunders.kinds import KINDS, PlantedBlunder
 from borechain.studies.drawn_rigs import KnownSetUp, RigDraw, drawn_rigs, tables_of
-from borechain.studies.heard_ground import heard_ground
+from borechain.studies.heard_ground import IN_ONE, heard_ground
 from borechain.studies.judged_hole import judge_hole_of
 from sim.studies.pool import Step, over_cores
 from sim.studies.scenarios import Tables
@@ -81,7 +81,7 @@ def tables_with(job: BlunderJob) -> Tables:
 def run_rig(job: BlunderJob) -> BlunderRun:
     """One rig, for a pool of processes."""
     world = World(scenario_of(dict(tables_with(job))), job.draw.seed)
-    with heard_ground(world) as ground:
+    with heard_ground(world, IN_ONE) as ground:
         judged = judge_hole_of(world, ground.model.hole)
         # of a direction with two degrees of freedom and a position with three, as a normal number is beyond its sigma
         squares = np.concatenate([judged.direction_squares / 2.0, judged.ellipsoid_squares / 3.0])
@@ -98,7 +98,7 @@ def outcome_of(run: BlunderRun, named: Sequence[str]) -> str:
     return "below" if run.worst <= BEYOND else "missed"
 
 
-def blunder_row(kind: BlunderKind, size: int, runs: Sequence[BlunderRun]) -> dict[str, Any]:
+def blunder_row(kind: PlantedBlunder, size: int, runs: Sequence[BlunderRun]) -> dict[str, Any]:
     """Row of one kind and size."""
     counts = Counter(outcome_of(run, kind.named) for run in runs)
     beyond = [run for run in runs if run.worst > BEYOND]

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from borechain.studies.drawn_rigs import KnownSetUp, RigDraw, drawn_rigs, rms_of, tables_of
-from borechain.studies.heard_ground import heard_ground
+from borechain.studies.heard_ground import IN_ONE, heard_ground
 from borechain.studies.judged_hole import (
     AXES,
     INSIDE_1,
@@ -117,7 +117,7 @@ def run_sketch(run_all: RunAll, case: SketchCase, rigs: int) -> list[SetUpRun]:
 def run_rig(draw: RigDraw) -> SetUpRun:
     """One rig, for a pool of processes."""
     world = World(scenario_of(dict(tables_of(draw))), draw.seed)
-    with heard_ground(world) as ground:
+    with heard_ground(world, IN_ONE) as ground:
         hole = ground.model.hole
         return SetUpRun(judge_hole_of(world, hole), best_of_rig(world, hole, ground.config, draw.known))
 
