@@ -15,7 +15,8 @@ from sim.world.random_streams import RandomStream, random_stream
 TUBES: Final = 10
 LENGTH: Final = 2.0  # m, of a tube
 MILLI_G_DEG: Final = math.degrees(1e-3)  # deg, of the tilt that a bias of 1 mg is seen as
-FREE_TURNS, SAME_TURNS = 5.382, 5.0  # of a block: the tool face goes on by the golden part of a turn, or comes again
+TURNS: Final = 5.0  # of a block: without a spread the same tool face comes again
+ANYWHERE: Final[dict[str, Any]] = {"samples_hz": 50.0, "drive": {"stop_spread_deg": 360.0}}  # a driller who stops so
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,8 @@ class RigDraw:
 def tables_of(draw: RigDraw) -> Tables:
     """Scenario of a rig."""
     known = draw.known
-    return {
+    stops = {"rough": ANYWHERE} if draw.stops_anywhere else {}
+    return stops | {
         "rig": {"tubes": TUBES, "tube_length_m": LENGTH},
         "path": {
             "drawn": {
@@ -72,7 +74,7 @@ def tables_of(draw: RigDraw) -> Tables:
             }
         },
         "schedule": {"add_s": 58.0, "stop_s": 26.0, "finish_s": 10.0},
-        "rotation": {"turns": FREE_TURNS if draw.stops_anywhere else SAME_TURNS},
+        "rotation": {"turns": TURNS},
         "joints": {
             "reading_std_deg": known.joint_deg,
             "mount_std_deg": known.mount_deg,

@@ -86,8 +86,8 @@ def moved_stretch(size: float) -> dict[str, Any]:
 
 
 def in_field(tables: Tables, **keys: dict[str, Any]) -> Tables:
-    """The scenario in a rough world that has this out of order and nothing else."""
-    return change_tables(tables, rough={"samples_hz": 50.0, **keys})
+    """The scenario with this of its rough world out of order."""
+    return change_tables(tables, rough=keys)
 
 
 K = BlunderKind
@@ -183,7 +183,9 @@ KINDS: Final[tuple[PlantedBlunder, ...]] = (
         of_told(lambda s: {"depth_stuck_after_s": MIDDLE_S, "depth_stuck_s": s}), DEPTH,
     ),
     PlantedBlunder("depth errs at every stop", "m", (0.01, 0.05, 0.2), of_told(lambda m: {"depth_std_m": m}), DEPTH),
-    PlantedBlunder("hole moves at two stations", "deg", (0.02, 0.1, 1.0), of_section("path", moved_stretch), (K.HOLE_MOVED,)),
+    PlantedBlunder(
+        "hole moves at two stations", "deg", (0.02, 0.1, 1.0), of_section("path", moved_stretch), (K.HOLE_MOVED,)
+    ),
     PlantedBlunder(
         "belt slips", "", (1e-4, 1e-3, 1e-2),
         lambda tables, part: in_field(tables, encoder={"belt_slip": part}), TURN,
