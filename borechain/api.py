@@ -153,7 +153,7 @@ def drill_rig(job: RigJob, watcher: RigWatcher | None = None) -> DrilledRig:
 def survey(
     file: str | Path,
     *,
-    method: str = "balanced-tangential",
+    method: str | None = None,
     instrument: str = "relay",
     displacement_rule: str = "exact",
     site: Site | None = None,
@@ -164,7 +164,8 @@ def survey(
     Parameters
     ----------
     file : CSV of md_m,inclination_deg,azimuth_deg or of md_m,a_cm,b_cm
-    method, instrument, displacement_rule : as the options of ``borechain survey``
+    method, instrument, displacement_rule : as the options of ``borechain survey``; the method is that of the record's
+        form where it is None
     site : gravity, magnetic field and latitude; the default is that of the command
     section_azimuth : of the vertical section, rad
 
@@ -175,13 +176,14 @@ def survey(
     """
     from groundstation.survey.files.survey_records import DisplacementRule, read_record
     from groundstation.survey.tools.instruments import load_tool
-    from groundstation.survey.well.analysis import analyse_survey
+    from groundstation.survey.well.analysis import analyse_survey, default_method
     from groundstation.survey.well.error_sources import Site
     from groundstation.survey.well.methods import Method
 
     place = site or Site(9.81, 50_000.0, math.radians(70.0), 0.0, math.radians(52.0))
     record = read_record(Path(file), DisplacementRule(displacement_rule))
-    return analyse_survey(record, Method(method), load_tool(instrument), place, section_azimuth)
+    path = default_method(record) if method is None else Method(method)
+    return analyse_survey(record, path, load_tool(instrument), place, section_azimuth)
 
 
 def answer_survey(request: SurveyRequest) -> SurveyAnswer:

@@ -31,8 +31,8 @@ BEAT_S = 0.2  # s between two moments of the rig
 PASSWORD = "for a picture"
 FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 PICTURES: dict[str, dict[str, Any]] = {
-    "dark": {"viewport": {"width": 1280, "height": 1130}, "color_scheme": "dark"},
-    "sunlight": {"viewport": {"width": 1280, "height": 1130}, "color_scheme": "light"},
+    "dark": {"viewport": {"width": 1280, "height": 1520}, "color_scheme": "dark"},
+    "sunlight": {"viewport": {"width": 1280, "height": 1520}, "color_scheme": "light"},
     "telephone": {"viewport": {"width": 360, "height": 900}, "color_scheme": "dark"},
 }
 

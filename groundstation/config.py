@@ -53,7 +53,12 @@ class GroundConfig(BaseModel):
     mount_tilt_std_deg: Positive | None = Field(
         None, description="of an IMU against its tube's axis until it is aligned; as mounted, 0.5, if absent"
     )
-    weighting: Weighting = Field(Weighting.BAYES, description="how the readings of one station count")
+    weighting: Weighting = Field(
+        Weighting.BAYES, description="how the readings of one station count, or all of the hole in one adjustment"
+    )
+    play_std_deg: Positive = Field(0.01, description="of a tube against the hole at a stop, until the looks tell it")
+    curvature_std_deg_per_m: Positive = Field(0.3, description="of the hole's curvature, before the looks")
+    curvature_length: Positive = Field(20.0, description="m, over which a curvature is forgotten")
     target: Positive = Field(30.0, description="m, length of the design axis")
     design_inclination_deg: float = Field(0.0, ge=0.0, le=180.0)
     design_azimuth_deg: float = 0.0

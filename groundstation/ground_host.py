@@ -69,11 +69,13 @@ def run_ground(
 
 def load_kernels() -> None:
     """Compile what surveys are computed with, or load it, before it says that it lives: no question waits for that."""
+    from groundstation.survey.adjustment.warm_adjustment import warm_adjustment
     from groundstation.survey.well.kernels.position_errors import warm_up
     from node.kernels.arithmetic.compiler import leave_blas_out
 
     leave_blas_out()
     warm_up()
+    warm_adjustment()
 
 
 def start_ground_process(config: GroundConfig) -> GroundProcess:

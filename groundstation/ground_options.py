@@ -14,7 +14,7 @@ from telemetry.runtime.typed_options import gather_options
 
 TOLERANCES = ("en-12716", "5-cm", "0.27-deg")
 POSITIVE = click.FloatRange(0.0, min_open=True)
-WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
+WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive", "adjusted")
 
 
 @dataclass(frozen=True, slots=True)

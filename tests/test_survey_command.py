@@ -117,6 +117,49 @@ def test_two_holes_that_come_near_end_with_status_three(tmp_path: Path) -> None:
     assert "TOO NEAR: least factor" in run(*words).stdout
 
 
+@pytest.mark.parametrize("course", [30, 100])
+def test_two_holes_that_cross_between_stations_end_with_status_three(tmp_path: Path, course: int) -> None:
+    one, other = tmp_path / "one.csv", tmp_path / "other.csv"
+    mds = [course * k for k in range(5)]
+    one.write_text("MD (m),Inc,Azi\n" + "".join(f"{md},0,0\n" for md in mds))
+    other.write_text("MD (m),Inc,Azi\n" + "".join(f"{md},90,270\n" for md in mds))
+    head = (
+        "--offset-head",
+        0,
+        2.4 * course,
+        1.6 * course,
+    )  # 2.4 courses east, 1.6 down: it runs back through the first
+    words = ("clearance", one, other, *head, "--radius-m", 0.1, "--offset-radius-m", 0.1)
+    found = answer(*words, status=3)
+    assert min(row["distance_m"] for row in found["stations"]) > 0.3 * course
+    for place in (found["least"], found["nearest"]):
+        expected = (1.6 * course, 2.4 * course, 0.0)
+        assert (place["md_m"], place["offset_md_m"], place["distance_m"]) == pytest.approx(expected, abs=1e-6)
+    assert f"0.00 m apart at {1.6 * course:.2f} m, {2.4 * course:.2f} m of the other hole" in run(*words).stdout
+
+
+def test_a_sidetrack_is_compared_from_where_it_leaves_its_hole(tmp_path: Path) -> None:
+    one, other, whole = (tmp_path / name for name in ("one.csv", "other.csv", "whole.csv"))
+    one.write_text("MD (m),Inc,Azi\n0,0,0\n30,5,0\n60,10,0\n90,10,0\n120,10,0\n")
+    other.write_text("MD (m),Inc,Azi\n60,10,0\n90,20,90\n120,40,90\n")
+    whole.write_text("MD (m),Inc,Azi\n0,0,0\n30,5,0\n60,10,0\n90,20,90\n120,40,90\n")
+    words = ("--instrument", "mwd-rev4", "--from-m", 60)
+    begins, cut = (answer("clearance", one, path, *words, status=3) for path in (other, whole))
+    assert begins["from_m"] == 60.0
+    assert [row["md_m"] for row in begins["stations"]] == [60.0, 90.0, 120.0]
+    assert begins["stations"][0]["distance_m"] == pytest.approx(0.0, abs=1e-9)
+    assert begins["stations"][0]["sigma_m"] == 0.0  # what erred above, both have alike
+    for a, b in zip(begins["stations"], cut["stations"], strict=True):
+        assert a == pytest.approx(b, abs=1e-9)
+    assert "begins at 60 m, so nothing says where that is" in refused("clearance", one, other)
+    assert "--from-m 45: expected a station there" in refused("clearance", one, whole, "--from-m", 45)
+    assert "--from-m 90: expected one that begins there, it begins at 60 m" in refused(
+        "clearance", one, other, "--from-m", 90
+    )
+    far = refused("clearance", one, whole, "--from-m", 60, "--offset-head", 3, 0, 0)
+    assert "the two lie 3.00 m apart there; expected one hole down to that depth" in far
+
+
 def test_a_file_that_begins_at_500_m_needs_its_beginning(tmp_path: Path) -> None:
     record, tie = tmp_path / "s.csv", tmp_path / "tie.toml"
     record.write_text(DEEP)
@@ -144,7 +187,20 @@ def test_stations_are_read_from_standard_input() -> None:
 
 def test_every_number_of_an_answer_is_in_the_north_it_names(tmp_path: Path) -> None:
     site = answer("survey", POTSDAM)
-    true = answer("survey", POTSDAM, "--north-of-site-deg", "10", "--origin", "100", "200", "35")
+    true = answer(
+        "survey",
+        POTSDAM,
+        "--north-of-site-deg",
+        "10",
+        "--answer-north",
+        "true",
+        "--convergence-deg",
+        "0",
+        "--origin",
+        "100",
+        "200",
+        "35",
+    )
     assert (site["north"], true["north"]) == ("site", "true")
     a, b = site["stations"][-1], true["stations"][-1]
     c, s = np.cos(np.radians(10.0)), np.sin(np.radians(10.0))

@@ -30,6 +30,7 @@ STRAIGHT = "".join(f"{name},{md},0,0\n" for name in "ABC" for md in (0, 5, 10))
         (OK, "--programme", GAP, "the station at 500 m lies in no leg; expected legs without a gap"),
         (OK, "--answer-depth-reference", "ground-level", "asked from the ground-level; expected the height"),
         (OK, "--depth-reference-height-m", "5", "given from the collar, so its height is 0; got 5 m"),
+        (OK, "--grid-scale-factor", "0", "grid scale factor: expected metres of the grid a metre on the ground"),
         (OK, "--instrument", ROLL, "formula 'Sin(Roll)': unknown name Roll; expected one of MD, MDPrev, TVD, Inc,"),
     ],
 )
@@ -38,7 +39,7 @@ def test_a_survey_that_contradicts_itself_is_refused_in_one_line(
 ) -> None:
     (tmp_path / "s.csv").write_text(record)
     (tmp_path / "other.toml").write_text(other)
-    word = other if "depth-reference" in option else tmp_path / "other.toml"
+    word = other if "depth-reference" in option or "scale" in option else tmp_path / "other.toml"
     done = run("survey", tmp_path / "s.csv", *([option, word] if option else []))
     assert (done.returncode, done.stdout) == (2, "")
     assert len(done.stderr.strip().splitlines()) == 1
@@ -64,6 +65,16 @@ def wall(folder: Path, heads: str, stations: str, more: str = "") -> Path:
         (HEADS, STRAIGHT, 'answer_depth_reference = "ground-level"', "column A: depth reference: depths are read from"),
         (HEADS, STRAIGHT, "depth_reference_height_m = 1.2", "column A: depth reference: depths are read and given"),
         (HEADS, STRAIGHT, 'tolerance = "0 mm"', "tolerance, by its name"),
+        (HEADS.replace("C,", "a,"), STRAIGHT, "", "line 4: column a stands in line 2 already as A; expected names"),
+        (
+            "column,north_m,east_m\nA,0,0\n",
+            STRAIGHT[:25],
+            "",
+            "expected at least two columns next to each other, got 1",
+        ),
+        ("column,north_m,east_m,down_m\nA,0,0,\nB,0,0.7,3\nC,0,1.4,\n", STRAIGHT, "", "B begins at 3 m: it opens at"),
+        (HEADS, STRAIGHT, "tight_to_m = 12", "column A ends at 10 m; expected a toe at 12 m"),
+        (HEADS, STRAIGHT, "grid_scale_factor = 0", "grid_scale_factor: expected a positive number, got 0"),
         ("column,north_m,east_m,radius_m\nA,0,0,-1\nB,0,0.7,\n", STRAIGHT, "", "column A: radius_m: expected a number"),
     ],
 )
@@ -74,6 +85,38 @@ def test_a_wall_that_cannot_be_is_refused_in_one_line(
     assert (done.returncode, done.stdout) == (2, "")
     assert len(done.stderr.strip().splitlines()) == 1
     assert named in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("other", "words", "named"),
+    [
+        ("MD (m),Inc,Azi\n0,0,0\n30,1,0\n30,1,0\n", (), "line 4: expected a measured depth beyond 30 m, got 30 m"),
+        (OK, (), "the reference hole runs in the offset hole all along; expected two holes"),
+        (OK, ("--offset-radius-m", -1), "-1"),
+        (DEEP, (), "begins at 500 m, so nothing says where that is; expected the collar at 0 m first, or --from-m"),
+    ],
+)
+def test_holes_that_have_no_clearance_are_refused_in_one_line(
+    tmp_path: Path, other: str, words: tuple[object, ...], named: str
+) -> None:
+    one, two = tmp_path / "one.csv", tmp_path / "two.csv"
+    one.write_text(OK)
+    two.write_text(other)
+    done = run("clearance", one, two, *words)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert named in done.stderr
+    assert words or len(done.stderr.strip().splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_parallel_holes_keep_clear_all_along(tmp_path: Path) -> None:
+    one = tmp_path / "one.csv"
+    one.write_text(OK)
+    done = run("clearance", one, one, "--offset-head", 0, 30, 0, "--same-instrument", "--json")
+    found = json.loads(done.stdout)
+    assert (done.returncode, done.stderr, found["clear"]) == (0, "", True)
+    assert found["nearest"]["distance_m"] == pytest.approx(min(row["distance_m"] for row in found["stations"]), abs=0.5)
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ from groundstation.report.plots import survey_figure
 from groundstation.report.style import svg_of
 from groundstation.survey.tools.instruments import SurveyTool
 from groundstation.survey.wall.column_deviation import ColumnDesign, Deviation, Tolerance, point_deviation
+from groundstation.survey.well.reference_frames import SiteGrid
 from groundstation.survey.well.trajectory import TrajectoryPoint
 
 Array = npt.NDArray[np.float64]
@@ -30,21 +31,22 @@ CLAUSES = {
 
 @dataclass(frozen=True, slots=True)
 class ReportSite:
-    """Site of a report: project, client, north, and site coordinates (m) of the zero, if any."""
+    """Site of a report: project, client, north, and the site's coordinates, if any."""
 
     project: str = ""
     client: str = ""
     north: str = "site"
     depth_reference: str = "collar"
     height_datum: str = ""
-    zero: tuple[float, float, float] | None = None
+    grid: SiteGrid | None = None
 
     def facts(self) -> list[tuple[str, str]]:
         """Lines at the top of every report."""
         zero = "local, none were given"
-        if self.zero is not None:
-            northing, easting, height = self.zero
+        if self.grid is not None:
+            northing, easting, height = self.grid.origin
             zero = f"N {northing:.3f} m, E {easting:.3f} m, height {height:.3f} m at the zero of this report"
+            zero += f"; {self.grid.north} north" + ("" if self.grid.scale == 1.0 else f", scale {self.grid.scale:g}")
         return [
             ("Project", self.project or "not stated"),
             ("Client", self.client or "not stated"),
@@ -143,10 +145,9 @@ def _design_facts(record: ColumnRecord, site: ReportSite) -> list[tuple[str, str
     design = record.design
     north, east, down = design.head
     facts = [("Head as set out", f"north {north:.3f} m, east {east:.3f} m, down {down:.3f} m")]
-    if site.zero is not None:
-        facts.append(
-            ("", f"N {site.zero[0] + north:.3f} m, E {site.zero[1] + east:.3f} m, {site.zero[2] - down:.3f} m")
-        )
+    if site.grid is not None:
+        northing, easting, height = site.grid.of_places(np.array(design.head)).tolist()
+        facts.append(("", f"N {northing:.3f} m, E {easting:.3f} m, {height:.3f} m"))
     facts.append(("Sigma of setting out", f"{1e3 * record.head_std:.1f} mm north and east"))
     lean = "vertical"
     if design.inclination > 0.0:
@@ -175,13 +176,13 @@ def instrument_facts(record: ColumnRecord) -> list[tuple[str, str]]:
 
 def _table(record: ColumnRecord, found: Sequence[Deviation], site: ReportSite) -> dict[str, object]:
     """Columns, rows and marked rows of the stations."""
-    site_columns = ("N m", "E m", "height m") if site.zero is not None else ("north m", "east m", "down m")
+    site_columns = ("N m", "E m", "height m") if site.grid is not None else ("north m", "east m", "down m")
     columns = ("MD m", "incl. deg", "azi. deg", *site_columns, "dev. mm", "sigma mm", "allowed mm", "used")
     rows = []
     for k, d in enumerate(found):
         place = record.positions[k]
-        if site.zero is not None:
-            place = np.array([site.zero[0] + place[0], site.zero[1] + place[1], site.zero[2] - place[2]])
+        if site.grid is not None:
+            place = site.grid.of_places(place)
         rows.append(
             (
                 f"{d.md:.2f}",

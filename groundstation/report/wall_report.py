@@ -13,12 +13,12 @@ from groundstation.report.document import Document, Origin, ReportSection, repor
 from groundstation.report.plots_wall import wall_figure
 from groundstation.report.style import svg_of
 from groundstation.survey.wall.as_built import ColumnState
-from groundstation.survey.wall.wall_columns import state_words
+from groundstation.survey.wall.wall_columns import state_words, survey_errors
 from groundstation.survey.wall.wall_file import Wall
 from groundstation.survey.wall.wall_joints import worst_depths, worst_joint
 from groundstation.survey.wall.wall_verdict import Judgement, WallVerdict, joint_name
-from groundstation.survey.well.error_columns import error_columns, position_covariance
-from groundstation.survey.well.error_sources import Leg, WellSurvey
+from groundstation.survey.well.error_columns import position_covariance
+from groundstation.survey.well.error_sources import WellSurvey
 from groundstation.survey.well.methods import station_positions
 
 WORDS = {
@@ -35,7 +35,10 @@ def site_of(wall: Wall) -> ReportSite:
     if file.depths_read_from != depths:
         height = "by column" if file.reference_height is None else f"{file.reference_height:g} m above it"
         depths = f"{depths} (stations were read from the {file.depths_read_from}, {height})"
-    return ReportSite(file.project, file.client, file.north, depths, file.height_datum, file.origin)
+    north = file.north
+    if file.stations_north != north:
+        north += f" north; stations were read from {file.stations_north}"
+    return ReportSite(file.project, file.client, north, depths, file.height_datum, file.grid)
 
 
 def column_records(wall: Wall, judgement: Judgement) -> list[ColumnRecord]:
@@ -49,8 +52,8 @@ def _record(wall: Wall, judgement: Judgement, k: int) -> ColumnRecord:
     places, covs = np.zeros((count, 3)), np.zeros((count, 3, 3))
     if count > 1:
         places = station_positions(wall.file.assumed.method, hole.md, hole.inclination, hole.azimuth)
-        survey = WellSurvey(hole.md, hole.inclination, hole.azimuth, places[:, 2])
-        covs = position_covariance(error_columns(survey, (Leg(plan.tool),), wall.file.assumed.site))
+        survey = WellSurvey(hole.md, hole.inclination, hole.azimuth, places[:, 2], hole.record)
+        covs = position_covariance(survey_errors(survey, plan.tool, wall.file.assumed))
     covs = covs + plan.head_std**2 * np.diag([1.0, 1.0, 0.0])
     actions = [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings if name in f.what.split("-")]
     actions += remedy_lines(wall, judgement, k)
@@ -74,8 +77,9 @@ def remedy_lines(wall: Wall, judgement: Judgement, of: int | None = None) -> lis
             continue
         north, east, _ = (np.array([extra.north, extra.east, extra.from_depth]) @ wall.built.frame).tolist()
         place = f"north {north + 0.0:.3f} m, east {east + 0.0:.3f} m"
-        if wall.file.origin is not None:
-            place += f" (N {wall.file.origin[0] + north:.3f} m, E {wall.file.origin[1] + east:.3f} m)"
+        if wall.file.grid is not None:
+            northing, easting, _ = wall.file.grid.of_places(np.array([north, east, 0.0])).tolist()
+            place += f" (N {northing:.3f} m, E {easting:.3f} m)"
         key = (place, extra.from_depth, extra.to_depth, extra.closes)
         places.setdefault(key, []).append(joint_name(wall.columns, pair))
     return [
@@ -103,6 +107,7 @@ def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
         ("Columns and joints", f"{len(wall.plans)} columns, {len(wall.pairs)} joints, {file.layout}"),
         ("Radius of a column", f"{' and '.join(f'{r:g}' for r in radii)} m{_scatter(wall)}"),
         ("Required thickness of a joint", f"{file.thickness:g} m"),
+        ("To be tight", tight_words(wall)),
         ("Tolerance", tolerance_text(file.tolerance)),
         (
             "P(anything open or too thin)",
@@ -126,6 +131,12 @@ def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
     good = judgement.verdict is WallVerdict.TIGHT
     verdict = f"The wall is {WORDS[judgement.verdict]}"
     return Document("Wall report", file.name, site.project or "as built", verdict, good, facts, sections, origin)
+
+
+def tight_words(wall: Wall) -> str:
+    """Depths between which the joints are to be tight."""
+    ends = {f"{top:g} to {bottom:g} m" for top, bottom in wall.tight_depths.tolist()}
+    return ends.pop() if len(ends) == 1 else "from the upper head to the lower toe of each joint"
 
 
 def _scatter(wall: Wall) -> str:

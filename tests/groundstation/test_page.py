@@ -138,6 +138,10 @@ def test_reading_is_open_here_and_ordering_is_not(page: PageClient) -> None:
     assert page.sign_in("operator", OPERATOR_PASSWORD).status == 200
     refused = page.post("/api/cmd/take_survey", {"tube": 1})
     assert (refused.status, "the role operator reads" in refused.content["error"]) == (403, True)
+    refused = page.post("/api/cmd/north", {"action": "tell", "angle_deg": 90, "sigma_deg": 1})
+    assert (refused.status, "the role operator reads" in refused.content["error"]) == (403, True)
+    north = next(row for row in page.get("/api/setup").content["items"] if row["item"] == "north")
+    assert (north["value"], north["detail"]) == ([0.0], "configuration")
 
 
 def test_a_driller_orders_and_the_course_is_on_the_key(page: PageClient) -> None:

@@ -99,6 +99,7 @@ def test_the_report_of_a_wall_says_what_is_wrong_and_what_to_do(judged: tuple[Wa
     facts = dict(document.facts)
     assert facts["Azimuths and coordinates"] == "grid north"
     assert facts["Tolerance"] == "50 mm + 1:100: 50 mm at the head and 1 % of the length"
+    assert facts["To be tight"] == "0 to 24 m"
     assert facts["Site coordinates"].startswith("N 5807120.500 m, E 372045.250 m, height 31.400 m")
 
 

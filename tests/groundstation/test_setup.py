@@ -10,10 +10,17 @@ import pytest
 from hand_fed import TOLD, Rig
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tapes import write
 
 from groundstation.config import checked_config
 from groundstation.errors import ConfigurationError, SelectorError, StoreError
+from groundstation.recording.ground_replay import replay_file
+from groundstation.recording.recording_file import Recording
 from groundstation.service.process.ground_process import GroundProcess
+from groundstation.service.setup.setup_book import SetupBook
+from groundstation.service.setup.setup_correction import chain_of, corrected_yaw
+from groundstation.service.setup.setup_items import setup_items
+from groundstation.service.setup.setup_priors import SetupPriors, setup_priors
 from groundstation.service.setup.told_value import (
     DamagedSetupError,
     SetupKind,
@@ -307,3 +314,70 @@ def test_every_command_of_the_setup_has_a_sigma_and_no_setup_command_goes_to_a_t
         assert sigma.quantity.low > 0.0
     with pytest.raises(CommandError):
         find_command("setup", "forget")
+
+
+def test_a_recording_repeats_what_was_told(tmp_path: Path) -> None:
+    rig = drilled(tmp_path / "ground")
+    order(rig, "north", action="tell", angle_deg=12.5, sigma_deg=0.2)
+    order(rig, "joint", tube=1, angle_deg=3.0, sigma_deg=0.1, used_deg=1.0)
+    order(rig, "setup", action="undo")
+    write(tmp_path / "shift.mcap", rig.ground)
+    again = replay_file(Recording(tmp_path / "shift.mcap"), tmp_path / "again").ground
+    assert again.operator.ask("stations")["stations"] == rig.ask("stations")["stations"]
+    assert [told.name for told in again.store.told()] == ["north", "joint.2-1", "joint.2-1"]
+    again.close()
+
+
+def test_priors_are_one_frozen_record_by_name(tmp_path: Path) -> None:
+    """What nothing tells has a sigma that is wide enough to be true, and what is told its own."""
+    rig = drilled(tmp_path, **NOTHING_TOLD)
+    model = rig.ground.model
+
+    def priors() -> SetupPriors:
+        return setup_priors(setup_items(model.config, model.setup, model.string), model.setup.version)
+
+    before = priors()
+    assert before.by_name["north"].sigma == pytest.approx(math.sqrt(ANY_YAW))
+    assert before.by_name["north"].mean == ()
+    assert before.by_name["collar"].sigma == pytest.approx(math.radians(1.0))
+    assert before.by_name["mount.2"].sigma == pytest.approx(math.radians(0.5))
+    expected = {"joint.2-1", "joint.drive-2", "joint.drive-1", "length.1", "stick_up", "depth_scale", "depth_offset"}
+    assert expected <= before.by_name.keys()
+    assert {"accelerometer.1", "gyroscope.2", "mount_turn.1", "play", "path", "gravity"} <= before.by_name.keys()
+    order(rig, "north", action="tell", angle_deg=12.5, sigma_deg=0.2)
+    after = priors()
+    assert after.version > before.version
+    assert after.by_name["north"].mean == (pytest.approx(math.radians(12.5)),)
+    assert after.by_name["north"].sigma == pytest.approx(math.radians(0.2))
+    assert all(prior.sigma > 0.0 for prior in after.by_name.values())
+    with pytest.raises(AttributeError):
+        after.version = 7  # type: ignore[misc]
+
+
+@given(st.data())
+def test_a_yaw_has_the_angles_and_the_errors_of_the_joints_above_it_each_by_itself(data: st.DataObject) -> None:
+    """Whatever was told to nodes and to the ground station, beside sums that a node's bound does not touch."""
+    count = data.draw(st.integers(1, 6))
+    by_node = data.draw(st.lists(st.booleans(), min_size=count, max_size=count))  # from the drive head down
+    by_ground = data.draw(st.lists(st.booleans(), min_size=count, max_size=count))
+    angles = data.draw(st.lists(st.floats(-3.0, 3.0), min_size=count, max_size=count))
+    book = SetupBook(checked_config(folder=Path("unused")))
+    tubes, sigma, mark, mount = list(range(count, 0, -1)), 0.01, math.radians(0.05), 1e-6
+    for place, tube in enumerate(tubes):
+        drive = NodeFlag.NONE if place or by_node[0] else NodeFlag.DRIVE_UNTOLD
+        lower = NodeFlag.NONE if tube == 1 or by_node[place + 1] else NodeFlag.LOWER_UNTOLD
+        book.on_flags(tube, place + 1, drive | lower)
+    names = [f"drive-{count}", *(f"{tube + 1}-{tube}" for tube in tubes[1:])]
+    told = [place for place in range(count) if by_ground[place] and not by_node[place]]
+    book.add(
+        ToldValue(number, SetupKind.JOINT, names[place], (angles[place],), sigma, "anna", "")
+        for number, place in enumerate(told, 1)
+    )
+    said, turn, var = mount, 0.0, mount
+    for place, tube in enumerate(tubes):
+        said = min(said - mount + (mark**2 if by_node[place] else ANY_YAW), ANY_YAW) + mount  # as nodes hand it down
+        turn += angles[place] if place in told else 0.0
+        var += mark**2 if by_node[place] else sigma**2 if place in told else ANY_YAW
+        found = corrected_yaw(said, chain_of(tube, tubes[:place][::-1]), book)
+        assert found[0] == pytest.approx(turn, abs=1e-12)
+        assert found[1] == pytest.approx(var, rel=1e-9)

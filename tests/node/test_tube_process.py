@@ -66,12 +66,13 @@ def test_no_reading_and_no_frame_ends_the_process(tmp_path: Path, wild: float) -
     assert process.state[0]["mode"] != 0
 
 
-def test_an_aiding_that_grew_beyond_what_can_be_said_is_not_handed_on(tmp_path: Path) -> None:
+def test_an_aiding_that_cannot_be_said_is_not_handed_on(tmp_path: Path) -> None:
+    """A torque that no message holds; constant errors that grew are those of any yaw at most, and can be said."""
     process = TubeProcess(TubeSettings(3, lower_joint=MakeUpAngle(0.0, 0.1)), tmp_path)
     process.endpoint.clock = ClockFilter(is_root=True)
     now = cycles(process, 110)
-    for var, unsayable in ((1e-4, 0), (VARIANCE, 1)):
-        process._on_aiding(Aiding(1.0, 1e-9, var, 0.0, 0.0, now, int(1 / var), 1), now)
+    for number, (var, torque, unsayable) in enumerate(((1e-4, 0.0, 0), (VARIANCE, 0.0, 0), (1e-4, 2e6, 1))):
+        process._on_aiding(Aiding(1.0, 1e-9, var, 0.0, 0.0, now, number, 1, torque), now)
         assert process.endpoint.counters["unsayable"] == unsayable
     cycles(process, 3, now)
     assert process.state[0]["yaw_known"]

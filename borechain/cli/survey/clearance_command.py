@@ -41,6 +41,11 @@ clearance_options = gather_options(
         metavar="NORTH EAST TVD",
         help="Head of the offset hole from that of the reference hole, m.",
     ),
+    click.option(
+        "--from-m",
+        type=float,
+        help="Of a sidetrack: depth of a station of both, down to which they are one hole.",
+    ),
     click.option("--k", type=click.FloatRange(0.0, min_open=True), default=3.5, show_default=True, help="Of the rule."),
     click.option(
         "--sigma-ahead-m", type=click.FloatRange(0.0), default=0.5, show_default=True, help="Of projecting ahead."
@@ -58,11 +63,12 @@ clearance_options = gather_options(
 @click.pass_context
 @plain_faults
 def clearance(context: click.Context, request: ClearanceRequest, as_json: bool) -> None:
-    """Separation factor of the hole REFERENCE from the hole OFFSET at every station of the first.
+    """Separation factor of the hole REFERENCE from the hole OFFSET, all along.
 
     Both are tables of stations from the collar, azimuths from true north. A factor above 1 keeps clear. It is given
-    twice: with the errors that both holes share, and as the published rule has it, as if they shared none. The exit
-    status is 3 where either is 1 or less.
+    twice: with the errors that both holes share, and as the published rule has it, as if they shared none; at every
+    station of the first hole, and where it is least on the arcs between them. The exit status is 3 where either is 1
+    or less anywhere.
 
     \b
     Example:
@@ -90,8 +96,13 @@ def show_clearance(result: dict[str, Any], title: str) -> None:
     for row in result["stations"]:
         table.add_row(*(f"{value:.3f}" for value in row.values()))
     paper.print(table)
-    least = result["least"]
     verdict = "clear" if result["clear"] else "TOO NEAR"
-    paper.print(
-        f"{verdict}: least factor {least['factor']:.2f}, {least['distance_m']:.2f} m apart at {least['md_m']:g} m"
-    )
+    least, nearest = result["least"], result["nearest"]
+    decides = min(least["factor"], least["independent_factor"])
+    paper.print(f"{verdict}: least factor {decides:.2f}, {_where(least)}")
+    paper.print(f"nearest: {_where(nearest)}")
+
+
+def _where(row: dict[str, float]) -> str:
+    """Distance and the depths at which it lies."""
+    return f"{row['distance_m']:.2f} m apart at {row['md_m']:.2f} m, {row['offset_md_m']:.2f} m of the other hole"

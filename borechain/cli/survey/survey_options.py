@@ -82,9 +82,8 @@ survey_options = gather_options(
     click.option(
         "--method",
         type=click.Choice(METHODS),
-        default="balanced-tangential",
-        show_default=True,
-        help="How the path between two stations is computed.",
+        help="How the path between two stations is computed; by default minimum-curvature, of lateral displacements "
+        "balanced-tangential, as their form was published with.",
     ),
     click.option(
         "--instrument",
@@ -147,18 +146,27 @@ survey_options = gather_options(
     click.option(
         "--answer-north",
         type=click.Choice(NORTHS),
-        help="North of the whole answer; by default that of FILE, or true north with --north-of-site-deg.",
+        help="North of the whole answer; by default that of FILE, or true north with --north-of-site-deg; with "
+        "--origin that of its coordinates.",
     ),
     click.option("--north-of-site-deg", type=float, help="Azimuth of the site's north from true north."),
     click.option(
-        "--convergence-deg", type=float, default=0.0, show_default=True, help="Azimuth of grid north from true north."
+        "--convergence-deg", type=float, help="Azimuth of grid north from true north; 0 where it is not needed."
     ),
     click.option(
         "--origin",
         type=float,
         nargs=3,
         metavar="NORTHING EASTING HEIGHT",
-        help="Site coordinates of the point where positions and depths are zero, m; adds those of every station.",
+        help="Site coordinates of the point where positions and depths are zero, m; adds those of every station. They "
+        "count from grid north, or from the site's where the answer does.",
+    ),
+    click.option(
+        "--grid-scale-factor",
+        type=float,
+        default=1.0,
+        show_default=True,
+        help="Metres of the grid a metre on the ground, of site coordinates.",
     ),
     click.option(
         "--depth-reference",

@@ -114,7 +114,11 @@ def show_wall(result: dict[str, Any]) -> None:
     paper = table_console(100)
     colour = "green" if result["verdict"] == "tight" else "bold red"
     frame = f"{result['north']} north, depth from {result['depth_reference']}"
+    if result["stations_north"] != result["north"]:
+        frame += f", stations read from {result['stations_north']} north"
     paper.print(f"[{colour}]{result['wall']}: {result['verdict']}[/] ({frame})")
+    ends = {f"{row['tight_from_m']:g} to {row['tight_to_m']:g} m" for row in result["joints"]}
+    paper.print(f"to be tight from {ends.pop() if len(ends) == 1 else 'the upper head to the lower toe of each joint'}")
     for finding in result["findings"]:
         paper.print(f"  {finding['kind']}: {finding['text']}", markup=False)
     table = Table(title=f"the {min(SHOWN, len(result['joints']))} most doubtful of {len(result['joints'])} joints")

@@ -77,6 +77,11 @@ KINDS: tuple[AlarmKind, ...] = (
         "all gyroscopes show the encoder to turn less, or more, by the same part: its belt slips, or it has "
         "other counts than its settings say; check the azimuths",
     ),
+    AlarmKind(
+        "blunder",
+        BAD,
+        "the surveys of the tubes contradict each other; the detail says what explains it best, and that is taken out",
+    ),
     AlarmKind("depth_refused", BAD, "readings of the depth are refused"),
     AlarmKind("depth_silent", BAD, "no depth comes any more"),
     AlarmKind("depth_contradicts", BAD, "the depth does not fit the tubes in the hole"),

@@ -39,6 +39,7 @@ class VerdictDoubt(enum.StrEnum):
     YAW = "yaw"
     UNCERTAIN = "uncertain"
     SETUP = "setup"
+    CONTRADICTION = "contradiction"
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,6 +39,7 @@ def known_of(
             *_doubts_of_setup(config, setup, string),
             *_doubts_of_time(string, alarms, config.stale_after),
             *_doubts_of_surveys(string, hole, alarms, BEHIND * config.tube_length),
+            *_contradictions(hole),
         ),
     )
 
@@ -64,6 +65,13 @@ def _doubts_of_surveys(
         yield VerdictDoubt.STALE, f"the bit is at {bit:.1f} m, the deepest survey at {deepest.md:.1f} m"
     if not deepest.is_trusted:
         yield VerdictDoubt.YAW, f"the yaw of the survey at {deepest.md:.1f} m is untrusted"
+
+
+def _contradictions(hole: SurveyedHole) -> Iterator[tuple[VerdictDoubt, str]]:
+    """What is wrong with the hole and may be one thing or another."""
+    if hole.is_adjusted and hole.examined is not None:
+        for sentence in hole.examined.doubts:
+            yield VerdictDoubt.CONTRADICTION, sentence
 
 
 def _doubts_of_time(string: KnownString, alarms: RigAlarms, stale_after: float) -> Iterator[tuple[VerdictDoubt, str]]:

@@ -66,6 +66,7 @@ class Watch:
         self._gaps: dict[int, Gap] = {}
         self._cross_check = EncoderCrossCheck()
         self._told_unplaced: set[int] = set()  # tubes
+        self._blamed: set[str] = set()  # subjects of what was found to be wrong with the hole
         self._depth_due = math.inf  # s, own clock, since when tubes are known and a depth may be expected
 
     def is_due(self, now: float) -> bool:
@@ -82,6 +83,7 @@ class Watch:
         self._look_at_depth(now)
         self._look_at_surveys()
         self._look_at_stops()
+        self._look_at_hole()
 
     def on_state(self, state: NodeState) -> None:
         """Judge what a node says of itself."""
@@ -92,6 +94,16 @@ class Watch:
         self._look_at_joint(state)
         if self._numbers.on_told(state.tube, state.numbered):
             self._alarms.alert("tube_counts_anew", tube, f"newest number {state.numbered}")
+
+    def _look_at_hole(self) -> None:
+        """Tell what is wrong with the hole by its surveys, and what is not any more."""
+        examined = self._hole.examined if self._hole.is_adjusted else None
+        blunders = {} if examined is None else examined.by_subject
+        for subject in self._blamed - blunders.keys():
+            self._alarms.clear("blunder", subject)
+        for subject, sentences in blunders.items():
+            self._alarms.hold("blunder", subject, "; ".join(sentences))
+        self._blamed = set(blunders)
 
     def on_event(self, event: Event) -> None:
         """Judge an event when it comes."""

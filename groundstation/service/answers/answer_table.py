@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from groundstation.errors import SelectorError
+from groundstation.service.answers.shapes.adjustment_shapes import AdjustmentAnswer
 from groundstation.service.answers.shapes.alarm_shapes import AlarmsAnswer
 from groundstation.service.answers.shapes.answer_fields import Fields, fields_of_answer, object_schema
 from groundstation.service.answers.shapes.column_shapes import ColumnAnswer, HistoryAnswer, Verdict
@@ -130,6 +131,13 @@ ANSWERS: Final = {
             ("confidence",),
             of_the_hole=True,
             on_page=True,
+        ),
+        AnswerKey(
+            "adjustment",
+            AdjustmentAnswer,
+            "what the tubes say about each other: how well all surveys fit, what is wrong and with what, sensors as "
+            "learnt, of what the sigma at the toe is made, what would be found, the angle of the next stop",
+            published=False,
         ),
         AnswerKey(
             "column",

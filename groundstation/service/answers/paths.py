@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from groundstation.errors import SelectorError
 from groundstation.service.answers import (
+    adjustment_views,
     alarm_views,
     column_views,
     hole_views,
@@ -38,6 +39,7 @@ from groundstation.service.answers.streamed_rows import Parameters
 
 # each tells ``MAKERS`` of its views when it is imported
 VIEWS: Final[tuple[ModuleType, ...]] = (
+    adjustment_views,
     alarm_views,
     column_views,
     hole_views,

@@ -7,22 +7,21 @@ import math
 import numpy as np
 
 from groundstation.service.hole.surveyed_hole import SurveyedHole
-from groundstation.service.setup.setup_items import PATH_STD
 from groundstation.survey.fusion.resolve import direction_angles
 
 CONTRADICTS = 4.0  # sigmas
 
 
-def collar_doubt(hole: SurveyedHole) -> str:
+def collar_doubt(hole: SurveyedHole, curvature_std: float) -> str:
     """How the first station contradicts the collar, in words; empty where it does not, or there is none.
 
-    Between the two the hole may bend as holes do.
+    Between the two the hole may bend by a curvature (rad/m).
     """
     station = next((one for one in hole.stations if one.md > 0.0), None)
     if station is None:
         return ""
     first, collar = hole.direction_of(station), hole.collar
-    bend = (PATH_STD * station.md) ** 2
+    bend = (curvature_std * station.md) ** 2
     apart = first.lean - collar.lean
     cov = first.total_cov + collar.total_cov + bend * np.eye(2)
     sigmas = math.sqrt(float(apart @ np.linalg.solve(cov, apart)))

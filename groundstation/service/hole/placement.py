@@ -91,17 +91,16 @@ class Placement:
                 fused.append(corrected_measurement(m, chain, self._setup))
                 above.append(chain)
                 places.append(place)
-                depths.append(self._told_depth(m.tube, mds[place]))
+                md = mds[place]
+                if self._setup.moves_depths:
+                    md += depth_shift(m.tube, self._string.tubes, self._tube_length, self._setup)
+                depths.append(max(md, 0.0))
         found: list[Found | None] = [None] * len(measurements)
         if fused:
             resolved = self._resolver.resolve_measurements(fused, depths, above)
             for place, one in zip(places, resolved, strict=True):
                 found[place] = one
         return found
-
-    def _told_depth(self, tube: int, md: float) -> float:
-        """Measured depth (m) of a tube's node by the lengths that were told."""
-        return max(md + depth_shift(tube, self._string.tubes, self._tube_length, self._setup), 0.0)
 
     def place(self, measurement: SurveyMeasurement, found: Found | None) -> str:
         """Give the hole what a measurement came to; returns the kind of alarm where it is not used as it is, or ''."""

@@ -30,9 +30,10 @@ GROWTH = 8  # share of its rows by which a table grows
 ROW: Final = np.dtype(
     [
         *((name, np.int64) for name in ("sequence", "replaces", "hops", "samples", "flags", "number")),
-        *((name, np.uint32) for name in ("tube", "width")),
+        *((name, np.uint32) for name in ("tube", "width", "chain")),
         *((name, np.uint8) for name in ("trust", "quality")),
         *((name, np.float64) for name in ("at", "md", "yaw", "yaw_var", "systematic_var", "force_var", "settle_time")),
+        ("force", np.float64, AXES),
         ("lean", np.float64, 2),
         ("down", np.float64),
         ("cov", np.float64, (2, 2)),

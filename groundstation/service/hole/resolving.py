@@ -86,7 +86,7 @@ class Resolver:
             by_force[own], by_yaw[own] = self._resolve_alike(stops, own, [measurements[row] for row in own])
         for row, (m, tubes) in enumerate(zip(measurements, above, strict=True)):
             stops.places.append(self._shared.places_of(m.tube, tubes))
-            rows["width"][row] = self._shared.count
+            rows["width"][row], rows["chain"][row] = self._shared.count, self._shared.chain_of(m.tube, tubes)
         rows["causes"] = causes_of_all(
             by_yaw, by_force, stops.places, rows["systematic_var"], self._mount_var, self._bias_std
         )
@@ -107,7 +107,8 @@ class Resolver:
         quality = check_all(forces, covs, combined, self._gravity, sent["samples"], sent["settle_time"], self._noise)
         whole_vars = (sent["yaw_var"] + sent["systematic_var"]).tolist()
         found = with_yaws_of(resolved, whole_vars, sent["trust"].tolist())
-        rows["lean"][own], rows["down"][own], rows["cov"][own] = found.lean, found.down, found.cov
+        rows["force"][own], rows["lean"][own], rows["down"][own] = combined[0], found.lean, found.down
+        rows["cov"][own] = found.cov
         rows["quality"][own], rows["force_var"][own] = quality, force_vars(covs)
         for row, each in zip(own, forces, strict=True):
             stops.forces[row] = each.tobytes()

@@ -17,7 +17,9 @@ import numpy.typing as npt
 
 from groundstation.config import GroundConfig
 from groundstation.service.hole.deviation_alarms import AlarmList
+from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import History
+from groundstation.service.hole.hole_adjustment import HoleAdjustment, directions_of
 from groundstation.service.hole.movement import Moved, Movement
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
@@ -62,6 +64,9 @@ class SurveyedHole:
         self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
         self._stations: list[SurveyStation] = []
         self._movement = Movement(self._stops, self._station_of)
+        self._adjustment = HoleAdjustment(self._config, self._shared)
+        self._examined: tuple[int, ExaminedHole | None] = (0, None)  # of the version that it is of
+        self._adjusted: dict[float, Direction] = {}  # by the depth (m) of a station, where the hole is adjusted
         self._alarms = AlarmList()
         self._history = History()
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
@@ -148,7 +153,38 @@ class SurveyedHole:
         """Direction of the hole at a station, the transport of the string in it."""
         self.settle()
         carried = self._carried.get(station.md)
-        return station.fused(self._config.weighting) if carried is None else carried.direction
+        return self._found(station) if carried is None else carried.direction
+
+    @property
+    def is_adjusted(self) -> bool:
+        """Whether all readings of the hole are adjusted in one, and not fused station by station."""
+        return self._config.weighting is Weighting.ADJUSTED
+
+    @property
+    def examined(self) -> ExaminedHole | None:
+        """The hole adjusted in one, and what is wrong with it; None before the first look at a station.
+
+        Where the stations are fused one by one it stands beside them, and is worked out when it is asked for.
+        """
+        if self._examined[0] != self.version:
+            below = self._below
+            place = {id(one): number for number, one in enumerate(below, 1)}
+            station_of_row = np.array([place.get(id(one), 0) for one in self._station_of], np.intp)
+            mds = np.array([one.md for one in below])
+            found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar)
+            self._examined = self.version, found
+        return self._examined[1]
+
+    @property
+    def _below(self) -> list[SurveyStation]:
+        """Stations below the collar."""
+        return [station for station in self._stations if station.md > 0.0]
+
+    def _found(self, station: SurveyStation) -> Direction:
+        """Direction of a station without transport; that of the collar is the collar's where the hole is adjusted."""
+        if not self.is_adjusted:
+            return station.fused(self._config.weighting)
+        return self._adjusted.get(station.md, self._collar)
 
     @property
     def has_transport(self) -> bool:
@@ -189,17 +225,24 @@ class SurveyedHole:
         """Work out what follows from the stops that have come since the last time."""
         since, self._unsettled_since = self._unsettled_since, math.inf
         if since < math.inf:
-            by_depth = self._touched | self._movement.judge_since(since)
-            changed, self._touched = [by_depth[md] for md in sorted(by_depth)], {}
-            self._fuse(changed)
-            self._work_out(changed)
+            self._work_out(self._adjust() if self.is_adjusted else self._fuse(since))
 
-    def _fuse(self, changed: Sequence[SurveyStation]) -> None:
-        """Fuse the stations of which something may have changed, together those that have one more stop."""
+    def _adjust(self) -> list[SurveyStation]:
+        """Adjust the hole; all of its stations have changed."""
+        self._touched, examined = {}, self.examined
+        found = [] if examined is None else directions_of(examined.adjusted, self._shared)
+        self._adjusted = dict(zip([one.md for one in self._below], found, strict=True))
+        return self._below
+
+    def _fuse(self, since: float) -> list[SurveyStation]:
+        """Fuse the stations of which something may have changed since a time (s), together those with one more stop."""
+        by_depth = self._touched | self._movement.judge_since(since)
+        changed, self._touched = [by_depth[md] for md in sorted(by_depth)], {}
         weighting = self._config.weighting
         if weighting is Weighting.BAYES and (grown := [station for station in changed if station.lacks_newest]):
             newest = self._stops.stack([station.stops.rows[-1] for station in grown])
             SurveyStation.add_newest(grown, newest)
+        return changed
 
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
         self._trajectory.put(self._directions(changed))
@@ -217,10 +260,9 @@ class SurveyedHole:
         Where the string turns in a bent hole these are all: what it turns by is that of the stations above, and of the
         one below too.
         """
-        weighting = self._config.weighting
         if not self.has_transport:
-            return [(one.md, one.fused(weighting)) for one in changed if one.md > 0.0]
-        measured = [(one.md, one.fused(weighting)) for one in self._stations if one.md > 0.0]
+            return [(one.md, self._found(one)) for one in changed if one.md > 0.0]
+        measured = [(one.md, self._found(one)) for one in self._below]
         if not measured:
             return []
         mds, directions = zip(*measured, strict=True)

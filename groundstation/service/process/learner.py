@@ -137,12 +137,15 @@ class Learner:
             return []
         damaged = self._store.damaged
         try:
-            stored = [one for one in self._store.messages() if isinstance(one.message, SurveyMeasurement)]
+            placed = [
+                (message, one.md)
+                for one in self._store.messages()
+                if isinstance(message := one.message, SurveyMeasurement) and one.md is not None
+            ]
         except StoreError:
             return []
         self._store.damaged = damaged  # they were counted at the start
         self._hole.begin_anew()
-        placed = [(one.message, one.md) for one in stored if one.md is not None]
         for begin in range(0, len(placed), RESTORED_TOGETHER):
             some = placed[begin : begin + RESTORED_TOGETHER]
             found = self._placement.resolve_measurements([m for m, _ in some], [md for _, md in some])
@@ -167,7 +170,8 @@ class Learner:
             found = dict(zip(placed, self._placement.resolve_measurements(measurements, mds), strict=True))
             for place, one in enumerate(some):
                 if place in placed:
-                    self._note_flags(placed[place][0])
+                    measurement = placed[place][0]
+                    self._setup.on_flags(measurement.tube, measurement.hops, measurement.flags)
                     self._string.numbers.add_number(one.message.tube, one.message.sequence)
                     self._place(placed[place][0], found[place])
                 else:
@@ -189,14 +193,10 @@ class Learner:
                 self._recalibration.on_static_record(message)
                 return ("static_records",)
             case SurveyMeasurement():
-                self._note_flags(message)
+                self._setup.on_flags(message.tube, message.hops, message.flags)
                 self._string.on_measurement(message, is_placed=False)
                 self._watch.on_measurement(message, self._placement.wait_for_depth(Stored(message, one.md, one.below)))
                 return self._by_survey
-
-    def _note_flags(self, measurement: SurveyMeasurement) -> None:
-        """See which angles the node of a survey was not told."""
-        self._setup.on_flags(measurement.tube, measurement.hops, measurement.flags)
 
     def _place(self, measurement: SurveyMeasurement, found: Found | None) -> None:
         """Give the hole what a measurement was resolved to."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import datetime
 import itertools
+import math
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -80,7 +81,7 @@ class OperatorAccess:
         self._recalibration = Recalibration(
             model.recalibration, store, config.calibrations, self._cancel_upload, self._surveyed_biases
         )
-        doubt = partial(collar_doubt, model.hole)
+        doubt = partial(collar_doubt, model.hole, math.radians(config.curvature_std_deg_per_m))
         self._setup = SetupOrders(model.setup, store, lambda: self._string.tubes, self._follow, doubt)
         self._handlers: dict[str, Callable[[SentOrder], None]] = {
             spec.name: self.tell_setup if spec.name in SETUP_COMMANDS else getattr(self, spec.name)

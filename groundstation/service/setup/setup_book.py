@@ -20,6 +20,7 @@ from groundstation.service.setup.told_value import (
 )
 from telemetry.messages import NodeFlag
 
+UNTOLD_BITS = int(NodeFlag.LOWER_UNTOLD | NodeFlag.DRIVE_UNTOLD)
 Pair = tuple[int, int]  # upper tube, or ``DRIVE``, and lower tube
 
 
@@ -34,6 +35,8 @@ class SetupBook:
     ----------
     entries : everything that orders told, the oldest first
     joints, lengths : what stands of the joints, and of the tubes
+    north, stick_up : angle (rad) and height (m) that stand; zero where none does
+    moves_depths : whether lengths or the stick-up were told
     version : grows with everything by which surveys mean something else
     revision : grows with everything that is entered, or that a node says anew of what it was told
     """
@@ -45,8 +48,11 @@ class SetupBook:
         self._standing: dict[str, ToldValue] = {}
         self.joints: dict[Pair, ToldValue] = {}
         self.lengths: dict[int, ToldValue] = {}
+        self.north = self.stick_up = 0.0
+        self.moves_depths = False
         self._lowers: dict[int, bool] = {}  # by tube, whether its node was told the angle of the joint below it
         self._drives: dict[int, bool] = {}  # and that of the joint to the drive head, of each that hung from it
+        self._lacked: set[int] = set()  # tubes whose joint below was not told once, less than zero: to the drive head
         self._stand()
 
     def standing(self, kind: SetupKind, subject: object = "") -> ToldValue | None:
@@ -82,7 +88,11 @@ class SetupBook:
         }
         standing = self._standing.values()
         self.joints = {pair_of(told.subject): told for told in standing if told.kind is SetupKind.JOINT}
+        north, stick_up = self.standing(SetupKind.NORTH), self.standing(SetupKind.STICK_UP)
+        self.north = 0.0 if north is None else north.values[0]
+        self.stick_up = 0.0 if stick_up is None else stick_up.values[0]
         self.lengths = {int(told.subject): told for told in standing if told.kind is SetupKind.LENGTH}
+        self.moves_depths = bool(self.lengths) or self.stick_up != 0.0
 
     def on_flags(self, tube: int, hops: int, flags: NodeFlag) -> None:
         """A node says, in a state or a measurement, which angles it was not told."""
@@ -91,6 +101,10 @@ class SetupBook:
         self._lowers[tube] = not bits & int(NodeFlag.LOWER_UNTOLD)
         if hops == 1:
             self._drives[tube] = not bits & int(NodeFlag.DRIVE_UNTOLD)
+        if bits & UNTOLD_BITS:
+            self._lacked |= {
+                key for key, flag in ((tube, NodeFlag.LOWER_UNTOLD), (-tube, NodeFlag.DRIVE_UNTOLD)) if bits & flag
+            }
         if before != (self._lowers[tube], self._drives.get(tube)):
             self.revision += 1
             self.version += bool(self.joints)  # where an angle stands it matters what the node knows of it
@@ -99,6 +113,11 @@ class SetupBook:
         """Whether a node was told the angle of a joint; None where none has said so."""
         upper, lower = pair
         return self._drives.get(lower) if upper == DRIVE else self._lowers.get(upper)
+
+    def was_untold(self, pair: Pair) -> bool:
+        """Whether a node has said once that it was not told the angle of a joint, or has not spoken yet."""
+        upper, lower = pair
+        return self.node_knows(pair) is None or (-lower if upper == DRIVE else upper) in self._lacked
 
     def joints_of(self, tubes: Sequence[int]) -> list[Pair]:
         """Joints that surveys rest on: those of the string (tubes from the top down), and each to the drive head."""

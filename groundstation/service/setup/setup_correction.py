@@ -14,14 +14,13 @@ from itertools import pairwise
 
 from groundstation.service.setup.setup_book import Pair, SetupBook
 from groundstation.service.setup.setup_items import JOINT_STD
-from groundstation.service.setup.told_value import DRIVE, SetupKind, ToldValue
+from groundstation.service.setup.told_value import DRIVE
 from groundstation.survey.bearings import wrap_azimuth
 from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
 from telemetry.frozen import replace
 from telemetry.messages import SurveyMeasurement
 
-LARGEST_VAR = 100.0  # rad^2, as a message says it
-UNTOLD_FROM = 0.5  # part of the variance of any yaw from which on an angle above a node was not told
+ANY_YAW = 0.5 * UNKNOWN_YAW_VAR  # rad^2, systematic variance from which on an angle above a node was not told
 
 
 def chain_of(tube: int, above: Sequence[int]) -> list[Pair]:
@@ -39,18 +38,20 @@ def corrected_measurement(
     ----------
     above : tubes above its own, lowest first; None where the order of the string is not known
     """
-    systematic = measurement.systematic_var
-    chain = [] if above is None or not book.joints else chain_of(measurement.tube, above)
-    turn, var = corrected_yaw(systematic, chain, book)
-    north = book.standing(SetupKind.NORTH)
-    turn += 0.0 if north is None else north.values[0]
-    if turn == 0.0 and var == systematic:
+    turn, var = book.north, measurement.systematic_var
+    if above is not None and (book.joints or var >= ANY_YAW):
+        by_joints, var = corrected_yaw(var, chain_of(measurement.tube, above), book)
+        turn += by_joints
+    if turn == 0.0 and var == measurement.systematic_var:
         return measurement
-    return replace(measurement, yaw=float(wrap_azimuth(measurement.yaw + turn)), systematic_var=min(var, LARGEST_VAR))
+    return replace(measurement, yaw=float(wrap_azimuth(measurement.yaw + turn)), systematic_var=var)
 
 
 def corrected_yaw(systematic_var: float, chain: Sequence[Pair], book: SetupBook) -> tuple[float, float]:
     """By what a yaw is to be turned (rad), and its systematic variance (rad^2) then.
+
+    A node bounds the sum of angles that may be any by one of them. Here each joint counts by itself, so that what a
+    tube has more than the one above it is the joint between them.
 
     Parameters
     ----------
@@ -58,23 +59,18 @@ def corrected_yaw(systematic_var: float, chain: Sequence[Pair], book: SetupBook)
     chain : joints from the tube up to the drive head
     """
     told = {pair: book.joints[pair] for pair in chain if pair in book.joints}
-    if not told:
-        return 0.0, systematic_var
+    again = [known for known in told.values() if known.used is not None]
+    turn, var = sum(known.correction for known in again), sum(known.sigma**2 for known in again)
+    if systematic_var < ANY_YAW:
+        return turn, systematic_var + var
     lacked = {pair: known for pair, known in told.items() if known.used is None}
-    again = {pair: known for pair, known in told.items() if known.used is not None}
-    turn, var = sum(known.correction for known in again.values()), systematic_var
-    if systematic_var >= UNTOLD_FROM * UNKNOWN_YAW_VAR:
-        turn += sum(known.correction for known in lacked.values())
-        if is_whole(chain, lacked, book):
-            marks = sum(book.node_knows(pair) is True for pair in chain)  # their errors are lost in that of any yaw
-            var = max(systematic_var - UNKNOWN_YAW_VAR, 0.0) + marks * JOINT_STD**2
-            var += sum(known.sigma**2 for known in lacked.values())
-    return turn, var + sum(known.sigma**2 for known in again.values())
-
-
-def is_whole(chain: Sequence[Pair], lacked: dict[Pair, ToldValue], book: SetupBook) -> bool:
-    """Whether every joint of a chain is known: to its node, or told in its place."""
-    return all(pair in lacked or book.node_knows(pair) is True for pair in chain)
+    untold = [pair for pair in chain if pair not in told and book.was_untold(pair)]
+    if not lacked and not untold:
+        return turn, systematic_var + var  # by what the nodes say now none lacked an angle: it is not known which did
+    marks = len(chain) - len(lacked) - len(untold)  # told to their nodes; their own errors are lost under the bound
+    var += max(systematic_var - UNKNOWN_YAW_VAR, 0.0) + marks * JOINT_STD**2 + len(untold) * UNKNOWN_YAW_VAR
+    turn += sum(known.correction for known in lacked.values())
+    return turn, var + sum(known.sigma**2 for known in lacked.values())
 
 
 def depth_shift(tube: int, tubes: Sequence[int], tube_length: float, book: SetupBook) -> float:
@@ -85,9 +81,7 @@ def depth_shift(tube: int, tubes: Sequence[int], tube_length: float, book: Setup
     tubes : of the string, from the top down
     tube_length : m, of every tube of the tally
     """
-    stick_up = book.standing(SetupKind.STICK_UP)
-    shift = 0.0 if stick_up is None else -stick_up.values[0]
     if not book.lengths or tube not in tubes:
-        return shift
+        return -book.stick_up
     below = (book.lengths[one] for one in tubes[tubes.index(tube) + 1 :] if one in book.lengths)
-    return shift + math.fsum(tube_length - told.values[0] for told in below)
+    return math.fsum(tube_length - told.values[0] for told in below) - book.stick_up

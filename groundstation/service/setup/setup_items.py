@@ -25,8 +25,6 @@ JOINT_STD = 0.05 * DEG  # of a scribe mark that a node was told; the ground stat
 LENGTH_STD = 5e-3  # m, of a tube as it is made
 STICK_UP_STD = 0.1  # m
 DEPTH_SCALE_STD, DEPTH_OFFSET_STD = 1e-3, 0.05  # 1 and m, of the block's position
-PLAY_STD = 0.05 * DEG  # each way, another one at every stop
-PATH_STD = 0.2 * DEG  # rad/m, curvature of a hole between two stations
 GRAVITY_STD = 0.02  # m/s^2, of the Earth's, where the site's is not measured
 ALONG = (SetupKind.LENGTH, SetupKind.STICK_UP, SetupKind.DEPTH_SCALE, SetupKind.DEPTH_OFFSET)  # errors of the depth
 GYROSCOPE_BIAS_STD = 0.02 * DEG  # rad/s; a node measures its own at rest
@@ -102,7 +100,7 @@ def missing_names(items: list[SetupItem]) -> list[str]:
 
 
 def _items_of_rig(config: GroundConfig, book: SetupBook) -> Iterator[SetupItem]:
-    design = math.radians(config.design_inclination_deg), math.radians(config.design_azimuth_deg)
+    design = config.design.inclination, config.design.azimuth
     for kind, unit, needed, values, sigma, source, detail in (
         (SetupKind.NORTH, "rad", True, (), UNKNOWN_YAW_STD, SetupSource.DEFAULT, "not told: any azimuth may be"),
         (SetupKind.COLLAR, "rad", False, design, COLLAR_STD, SetupSource.DESIGN, "not told: as the design"),
@@ -119,8 +117,8 @@ def _items_of_rig(config: GroundConfig, book: SetupBook) -> Iterator[SetupItem]:
     for kind, values, sigma, unit, detail in (
         (SetupKind.DEPTH_SCALE, (1.0,), DEPTH_SCALE_STD, "1", rules[0]),
         (SetupKind.DEPTH_OFFSET, (0.0,), DEPTH_OFFSET_STD, "m", rules[0]),
-        (SetupKind.PLAY, (0.0,), PLAY_STD, "rad", rules[1]),
-        (SetupKind.PATH, (0.0,), PATH_STD, "rad/m", rules[1]),
+        (SetupKind.PLAY, (0.0,), math.radians(config.play_std_deg), "rad", rules[1]),
+        (SetupKind.PATH, (0.0,), math.radians(config.curvature_std_deg_per_m), "rad/m", rules[1]),
         (SetupKind.GRAVITY, (config.gravity,), GRAVITY_STD, "m/s^2", CONFIGURATION),
     ):
         yield SetupItem(kind, "", values, sigma, unit, default, detail)

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Final, Protocol
 
 from groundstation.errors import SelectorError
 from groundstation.service.setup.setup_book import Pair, SetupBook
 from groundstation.service.setup.told_value import DRIVE, SetupKind, ToldValue, joint_subject
 from telemetry.application.commands import CommandSpec
+
+VALUES: Final = {  # arguments that hold what an order tells
+    SetupKind.NORTH: ("angle",),
+    SetupKind.COLLAR: ("inclination", "azimuth"),
+    SetupKind.JOINT: ("angle",),
+    SetupKind.LENGTH: ("length",),
+    SetupKind.STICK_UP: ("height",),
+}
 
 
 class SetupStore(Protocol):
@@ -78,19 +86,8 @@ class SetupOrders:
         """
         if order.spec.name == "setup":
             return self._enter(self._taken_back(order))
-        kind = SetupKind(order.spec.name)
-        told = order.arguments
-        match kind:
-            case SetupKind.COLLAR:
-                subject, values = "", (told["inclination"], told["azimuth"])
-            case SetupKind.JOINT:
-                subject, values = joint_subject(*self._checked_joint(order)), (told["angle"],)
-            case SetupKind.LENGTH:
-                subject, values = str(order.tube), (told["length"],)
-            case SetupKind.STICK_UP:
-                subject, values = "", (told["height"],)
-            case _:
-                subject, values = "", (told["angle"],)
+        kind, told = SetupKind(order.spec.name), order.arguments
+        subject, values = self._subject_of(kind, order), tuple(told[name] for name in VALUES[kind])
         number = self._book.next_number()
         entry = ToldValue(number, kind, subject, values, told["sigma"], order.by, order.utc, told.get("used"))
         before = self._book.standing(kind, subject)
@@ -99,6 +96,11 @@ class SetupOrders:
             detail = f"{detail}; before it was {shown_value(before)} by {before.by}, which is kept too"
         doubt = self._check_collar() if kind is SetupKind.COLLAR else ""
         return f"{detail}; {doubt}" if doubt else detail
+
+    def _subject_of(self, kind: SetupKind, order: SetupOrder) -> str:
+        if kind is SetupKind.JOINT:
+            return joint_subject(*self._checked_joint(order))
+        return str(order.tube) if kind is SetupKind.LENGTH else ""
 
     def _enter(self, entry: ToldValue) -> str:
         self._store.keep_told(entry)

@@ -50,10 +50,9 @@ def collar_direction(config: GroundConfig, book: SetupBook) -> Direction:
     """Direction of the hole at the collar as well as it is known: told, or that of the design."""
     told = book.standing(SetupKind.COLLAR)
     if told is None:
-        return uncertain_direction(
-            math.radians(config.design_inclination_deg), math.radians(config.design_azimuth_deg), COLLAR_STD
-        )
-    return uncertain_direction(*told.values, told.sigma)
+        return uncertain_direction(config.design.inclination, config.design.azimuth, COLLAR_STD)
+    inclination, azimuth = told.values
+    return uncertain_direction(inclination, azimuth, told.sigma)
 
 
 def uncertain_direction(inclination: float, azimuth: float, std: float) -> Direction:

@@ -8,11 +8,12 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks, PathPrior, StartingPoint, StringPrior
 
 Array = npt.NDArray[np.float64]
+Truths = npt.NDArray[np.bool_]
 KNOWN_TURN = 0.3  # rad, standard deviation of a turn up to which it is used as it is told
 
 
 def first_start(looks: Looks, string: StringPrior, path: PathPrior) -> StartingPoint:
-    """Directions from the looks whose yaw is known best; turns that nobody knows from what others saw there.
+    """Directions from the looks whose yaw is known best; turns that are not known from what others saw there.
 
     Where a station has no look it goes on as the one above it.
     """
@@ -40,7 +41,7 @@ def _vars_of_turns(looks: Looks, string: StringPrior) -> Array:
     return np.asarray(cov[tube, tube] + cov[make_up, make_up] + 2.0 * cov[tube, make_up])
 
 
-def _find_turns(looks: Looks, string: StringPrior, turns: Array, tangents: Array, unknown: Array) -> None:
+def _find_turns(looks: Looks, string: StringPrior, turns: Array, tangents: Array, unknown: Truths) -> None:
     """Turn first tubes and then make-ups whose turn is wide so that some looks agree with the directions there."""
     seen = looks.force[:, 0] + 1j * looks.force[:, 1]
     there = (tangents[looks.station, 0] + 1j * tangents[looks.station, 1]) * np.exp(-1j * looks.yaw)
@@ -57,8 +58,9 @@ def _mean_directions(looks: Looks, yaws: Array, path: PathPrior, weights: Array)
     units = np.stack([turned.real, turned.imag, -looks.force[:, 2]], axis=1)
     units /= np.linalg.norm(units, axis=1, keepdims=True)
     trusted = weights / (np.sin(np.sqrt(np.minimum(looks.yaw_var, 2.0))) ** 2 + 1e-8)
-    sums = np.stack([np.bincount(looks.station, trusted * one, minlength=len(path.md)) for one in units.T], axis=1)
-    tangents = np.empty_like(sums)
+    count = len(path.md)
+    sums: Array = np.stack([np.bincount(looks.station, trusted * one, minlength=count) for one in units.T], axis=1)
+    tangents: Array = np.empty_like(sums)
     tangents[0] = path.collar
     for k in range(1, len(sums)):
         size = float(np.linalg.norm(sums[k]))

@@ -74,7 +74,7 @@ def with_collar(record: SurveyRecord) -> SurveyRecord:
         raise SurveyError(f"collar: expected a record that begins below 0 m, got {record.md[0]:g} m")
     columns = {name: np.concatenate([values[:1], values]) for name, values in record.columns.items()}
     md, inclination, azimuth = (np.concatenate([[0.0], a]) for a in (record.md, record.inclination, record.azimuth))
-    return SurveyRecord(md, inclination, azimuth, [0, *record.lines], columns)
+    return SurveyRecord(md, inclination, azimuth, [0, *record.lines], columns, record.of_displacements)
 
 
 def read_columns(
@@ -208,7 +208,7 @@ def _from_displacements(path: Path, table: dict[str, Array], lines: list[int], r
     exact = rule is DisplacementRule.EXACT
     inclination = np.arcsin(lateral / length) if exact else np.hypot(np.arctan(a / length), np.arctan(b / length))
     azimuth = wrap_azimuth(np.arctan2(a, -b)) * (lateral > 0.0)
-    return SurveyRecord(md, inclination, azimuth, lines, _others(table, DISPLACEMENTS))
+    return SurveyRecord(md, inclination, azimuth, lines, _others(table, DISPLACEMENTS), of_displacements=True)
 
 
 def _others(table: dict[str, Array], taken: tuple[str, ...]) -> dict[str, Array]:

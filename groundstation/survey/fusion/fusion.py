@@ -30,8 +30,12 @@ Departure = tuple[Array, float]
 
 
 class Weighting(Enum):
-    """Weights of the readings of one station, oldest first."""
+    """How the readings of stations come to directions: all of the hole in one, or by weights within each station.
 
+    The latter, oldest first, are the thesis's, for experiments.
+    """
+
+    ADJUSTED = "adjusted"
     BAYES = "bayes"
     EQUAL = "equal"
     LINEAR = "linear"

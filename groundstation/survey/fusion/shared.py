@@ -25,7 +25,7 @@ CAUSES = 2 + AXES  # of the columns of a reading: mount, joint, and each axis
 MOST_OF_16_BITS = 1 << 16
 KINDS = {"mount": "mounts", "joint": "joints", "drive": "joints", "string": "joints", "bias": "accelerometer_bias"}
 KIND_NAMES = sorted(set(KINDS.values()))
-TRANSPORT = "transport"  # of columns that random errors share; they are of no kind
+TRANSPORT, ADJUSTED = "transport", "adjusted"  # of columns that random errors share; they are of no kind
 
 
 def put_columns(columns: Array, causes: Array, places: Places) -> None:
@@ -67,6 +67,14 @@ class Packed:
         self.places: npt.NDArray[Any] = at.astype(np.uint16 if columns.shape[1] <= MOST_OF_16_BITS else np.intp)
         self.values: Array = columns.take(at, axis=1)
         self.width = int(columns.shape[1])
+
+    @classmethod
+    def of_values(cls, values: Array, places: Places, width: int) -> Packed:
+        """Columns of which ``values`` (k, c) stand at ``places`` (c,), of ``width``."""
+        made = cls.__new__(cls)
+        made.places = places.astype(np.uint16 if width <= MOST_OF_16_BITS else np.intp)
+        made.values, made.width = values, width
+        return made
 
     def under(self, matrix: Array) -> Packed:
         """Return the columns ``matrix`` (j, k) @ columns (k, s), of shape (j, s)."""
@@ -134,6 +142,8 @@ class SharedErrors:
         self._places: dict[str, list[int]] = {}  # of the columns of each kind, in the order of their coming
         self._known: dict[tuple[int, ...] | int, Places] = {}  # by a tube and those above it, or a tube alone
         self._transport: list[int] = []
+        self._adjusted: list[int] = []
+        self._chains: dict[tuple[int, ...] | int, int] = {}
 
     @property
     def count(self) -> int:
@@ -203,6 +213,22 @@ class SharedErrors:
             names: list[Name] = [("mount", tube), *chain, *(("bias", tube, axis) for axis in range(AXES))]
             known = self._known[string] = np.array([self._place_of(name) for name in names], np.intp)
         return known
+
+    def chain_of(self, tube: int, above: Sequence[int] | None) -> int:
+        """Number of a tube with the joints above it, in the order in which they were met."""
+        string = tube if above is None else (tube, *above)
+        return self._chains.setdefault(string, len(self._chains))
+
+    def chain(self, number: int) -> tuple[int, tuple[int, ...] | None]:
+        """Tube of a chain, and the tubes above it, lowest first; None where their order was not known."""
+        string = list(self._chains)[number]
+        return (string, None) if isinstance(string, int) else (string[0], string[1:])
+
+    def adjusted_places(self, count: int) -> Places:
+        """Places of so many columns of an adjustment, whose errors are of no kind."""
+        while len(self._adjusted) < count:
+            self._adjusted.append(self._place_of((ADJUSTED, len(self._adjusted))))
+        return np.array(self._adjusted[:count], np.intp)
 
     def _place_of(self, name: Name) -> int:
         """Place of the column of an error, the next one where it is met for the first time."""

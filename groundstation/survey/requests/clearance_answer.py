@@ -2,17 +2,36 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from groundstation.errors import SurveyError
 from groundstation.survey.files.field_files import read_any
 from groundstation.survey.requests.clearance_request import ClearanceRequest
 from groundstation.survey.tools.instruments import load_tool
-from groundstation.survey.well.clearance import Clearance, ClearanceHole, Rule, clearance_between
+from groundstation.survey.well.analysis import record_variables
+from groundstation.survey.well.clearance import Clearance, ClearanceHole, Rule, Separations, clearance_between
 from groundstation.survey.well.error_sources import Leg, WellSurvey
 from groundstation.survey.well.methods import Method, station_positions
+from groundstation.survey.well.reference_frames import SAME_DEPTH
+from groundstation.survey.well.well_record import SurveyRecord
+
+Array = npt.NDArray[np.float64]
+SAME_PLACE = 0.1  # m, of two records of one hole
+
+
+@dataclass(frozen=True, slots=True)
+class _Described:
+    """How one hole is described: the words for it, its record, instrument, head and radius."""
+
+    name: str
+    record: SurveyRecord
+    instrument: str
+    head: Array
+    radius: float
 
 
 def answer_clearance(request: ClearanceRequest) -> dict[str, Any]:
@@ -24,39 +43,101 @@ def answer_clearance(request: ClearanceRequest) -> dict[str, Any]:
         When a record or an instrument cannot be used.
     """
     serial = "one" if request.same_instrument else ""
-    offset_tool = request.offset_instrument or request.instrument
-    first = read_hole(request.reference, request.instrument, (0.0, 0.0, 0.0), request.radius_m, serial)
-    second = read_hole(request.offset, offset_tool, request.offset_head, request.offset_radius_m, serial)
+    mine = _Described(
+        str(request.reference), read_any(request.reference).record, request.instrument, np.zeros(3), request.radius_m
+    )
+    theirs = _Described(
+        str(request.offset), read_any(request.offset).record, request.offset_instrument or request.instrument,
+        np.array(request.offset_head), request.offset_radius_m,
+    )  # fmt: skip
     rule = Rule(request.k, request.sigma_ahead_m, request.margin_m)
-    return clearance_result(first, clearance_between(first, second, request.site.to_site(), rule))
+    if request.from_m is None:
+        holes = [_hole(hole, serial) for hole in (mine, theirs)]
+    else:
+        holes = _sidetrack(mine, theirs, request.from_m, serial)
+    return clearance_result(clearance_between(holes[0], holes[1], request.site.to_site(), rule), request.from_m)
 
 
-def read_hole(
-    path: Path, instrument: str, head: tuple[float, float, float], radius: float, serial: str
-) -> ClearanceHole:
-    """A hole of a record from its head (m, north, east, down), surveyed by one instrument."""
-    record = read_any(path).record
-    places = np.array(head) + station_positions(Method.MINIMUM_CURVATURE, record.md, record.inclination, record.azimuth)
-    survey = WellSurvey(record.md, record.inclination, record.azimuth, places[:, 2] - head[2])
-    return ClearanceHole(survey, places, (Leg(load_tool(instrument)),), radius, serial)
+def _hole(described: _Described, serial: str, first: int = 0) -> ClearanceHole:
+    """A hole from its head on, surveyed by one instrument; its errors count from its station ``first``."""
+    record = described.record
+    if abs(float(record.md[0])) > SAME_DEPTH:
+        raise SurveyError(
+            f"{described.name}: the record begins at {record.md[0]:g} m, so nothing says where that is; expected the "
+            "collar at 0 m first, or --from-m of a sidetrack that begins there"
+        )
+    places = station_positions(Method.MINIMUM_CURVATURE, record.md, record.inclination, record.azimuth)
+    return _surveyed(described, places, serial, first)
 
 
-def clearance_result(hole: ClearanceHole, found: Clearance) -> dict[str, Any]:
-    """Stations, the least factor and the frame as one object."""
+def _surveyed(described: _Described, places: Array, serial: str, first: int) -> ClearanceHole:
+    """A hole whose stations lie at places (n, 3) from its head, from its station ``first`` on."""
+    record = described.record
+    columns = {name: values[first:] for name, values in record_variables(record.columns).items()}
+    md, inclination, azimuth, tvd = (
+        values[first:] for values in (record.md, record.inclination, record.azimuth, places[:, 2])
+    )
+    survey = WellSurvey(md, inclination, azimuth, tvd, columns)
+    tool = load_tool(described.instrument)
+    return ClearanceHole(survey, described.head + places[first:], (Leg(tool),), described.radius, serial)
+
+
+def _sidetrack(mine: _Described, theirs: _Described, from_m: float, serial: str) -> list[ClearanceHole]:
+    """Two holes that are one down to a station of both: what erred above it, both have alike.
+
+    Raises
+    ------
+    SurveyError
+        When a record has no station there, or they lie elsewhere there.
+    """
+    reference = _hole(mine, serial, _station_at(mine, from_m))
+    if theirs.record.md[0] > SAME_DEPTH:
+        _station_at(theirs, from_m, begins=True)
+        places = station_positions(
+            Method.MINIMUM_CURVATURE, theirs.record.md, theirs.record.inclination, theirs.record.azimuth
+        )
+        offset = _surveyed(theirs, reference.positions[0] - theirs.head + places, serial, 0)
+    else:
+        offset = _hole(theirs, serial, _station_at(theirs, from_m))
+    apart = float(np.linalg.norm(offset.positions[0] - reference.positions[0]))
+    if apart > SAME_PLACE:
+        raise SurveyError(
+            f"--from-m {from_m:g}: the two lie {apart:.2f} m apart there; expected one hole down to that depth"
+        )
+    return [reference, offset]
+
+
+def _station_at(described: _Described, from_m: float, *, begins: bool = False) -> int:
+    """Number of the station at a depth; of one that begins there, 0."""
+    md = described.record.md
+    found = np.flatnonzero(np.abs(md - from_m) <= SAME_DEPTH)
+    if not len(found) or found[0] >= len(md) - 1 or (begins and found[0] != 0):
+        words = f"one that begins there, it begins at {md[0]:g} m" if begins else "a station there and one below it"
+        raise SurveyError(f"{described.name}: --from-m {from_m:g}: expected {words}")
+    return int(found[0])
+
+
+def separation_rows(found: Separations) -> list[dict[str, float]]:
+    """One object a place of the reference hole."""
     columns = {
-        "md_m": hole.survey.md,
+        "md_m": found.md,
         "offset_md_m": found.offset_md,
         "distance_m": found.distance,
         "sigma_m": found.sigma,
         "factor": found.factor,
         "independent_factor": found.independent_factor,
     }
-    values = [column.tolist() for column in columns.values()]
-    stations = [dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
-    least = min(stations, key=lambda row: min(row["factor"], row["independent_factor"]))
-    frame = {"north": "true", "depth_reference": "head of the reference hole"}
-    return frame | {
-        "clear": min(least["factor"], least["independent_factor"]) > 1.0,
-        "least": least,
-        "stations": stations,
+    return [dict(zip(columns, row, strict=True)) for row in zip(*(c.tolist() for c in columns.values()), strict=True)]
+
+
+def clearance_result(found: Clearance, from_m: float | None = None) -> dict[str, Any]:
+    """Stations, the places of the least factor and of the least distance, and the frame as one object."""
+    return {
+        "north": "true",
+        "depth_reference": "head of the reference hole",
+        "from_m": from_m,
+        "clear": found.clear,
+        "least": separation_rows(found.least)[0],
+        "nearest": separation_rows(found.nearest)[0],
+        "stations": separation_rows(found.stations),
     }

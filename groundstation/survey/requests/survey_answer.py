@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from groundstation.errors import SurveyError
@@ -15,11 +15,23 @@ from groundstation.survey.requests.survey_request import PROGRAMME_ALONE, FrameR
 from groundstation.survey.requests.survey_rows import source_rows, station_at_depth, station_rows
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
 from groundstation.survey.tools.iscwsa_json import to_json
-from groundstation.survey.well.analysis import Analysis, Stretch, analyse_survey, with_azimuth_error
+from groundstation.survey.well.analysis import (
+    Analysis,
+    Stretch,
+    analyse_survey,
+    default_method,
+    with_azimuth_error,
+)
 from groundstation.survey.well.depth_reference import DepthReference, depth_reference
 from groundstation.survey.well.gyro_export import as_gyro, needs_record
 from groundstation.survey.well.methods import Method
-from groundstation.survey.well.reference_frames import Norths, ReferenceFrame
+from groundstation.survey.well.reference_frames import (
+    Norths,
+    ReferenceFrame,
+    SiteGrid,
+    check_grid_scale,
+    north_of_coordinates,
+)
 from groundstation.survey.well.well_record import SurveyRecord
 
 
@@ -79,7 +91,8 @@ def analyse_record(record: SurveyRecord, tool: SurveyTool | list[Stretch], reque
     frame = reference_frame(request.frame)
     tied = None if request.tie_on is None else read_tie_on(request.tie_on)
     section = math.radians(request.section_azimuth_deg)
-    found = analyse_survey(record, Method(request.method), tool, request.site.to_site(), section, frame, tied)
+    method = default_method(record) if request.method is None else Method(request.method)
+    found = analyse_survey(record, method, tool, request.site.to_site(), section, frame, tied)
     first, last = found.md[0], found.md[-1]
     for depth in request.md:
         if not first <= depth <= last:
@@ -89,12 +102,34 @@ def analyse_record(record: SurveyRecord, tool: SurveyTool | list[Stretch], reque
 
 def reference_frame(asked: FrameRequest) -> ReferenceFrame:
     """Norths and depth references of the record and of the answer."""
-    angles = (asked.north_of_site_deg or 0.0, asked.convergence_deg, asked.declination_deg)
+    angles = (asked.north_of_site_deg or 0.0, asked.convergence_deg or 0.0, asked.declination_deg)
+    norths = Norths(*map(math.radians, angles))
     answer = asked.answer_north
     if answer is None:
         answer = asked.north if asked.north_of_site_deg is None else "true"
-    frame = ReferenceFrame(asked.north, answer, Norths(*map(math.radians, angles)))
-    return replace(frame, depths=depth_references(asked), height_datum=asked.height_datum or "")
+        answer = answer if asked.origin is None else north_of_coordinates(answer)
+    grid = site_grid(asked, answer, norths)
+    depths = depth_references(asked)
+    return ReferenceFrame(asked.north, answer, norths, depths, asked.height_datum or "", grid)
+
+
+def site_grid(asked: FrameRequest, answer: str, norths: Norths) -> SiteGrid | None:
+    """Site coordinates of the answer; None where no origin is stated.
+
+    Raises
+    ------
+    SurveyError
+        When the azimuth of grid north is not told and they need it, or there is a scale factor alone.
+    """
+    check_grid_scale(asked.grid_scale_factor)
+    if asked.origin is None:
+        if asked.grid_scale_factor != 1.0:
+            raise SurveyError("--grid-scale-factor: expected --origin beside it")
+        return None
+    north = north_of_coordinates(answer)
+    if north == "grid" and asked.north != "grid" and asked.convergence_deg is None:
+        raise SurveyError("--origin: its coordinates count from grid north; expected --convergence-deg beside it")
+    return SiteGrid(asked.origin, north, norths.of(north) - norths.of(answer), asked.grid_scale_factor)
 
 
 def depth_references(asked: FrameRequest) -> DepthReference:
@@ -113,19 +148,21 @@ def depth_references(asked: FrameRequest) -> DepthReference:
 
 def survey_result(request: SurveyRequest, understood: Understood, instrument: str, found: Analysis) -> dict[str, Any]:
     """The object for JSON."""
-    frame, origin, sigma = found.frame, request.frame.origin, request.sigma
+    frame, grid, sigma = found.frame, found.frame.grid, request.sigma
     return {
         "file": str(request.file),
         "read_as": understood.line,
-        "method": request.method,
+        "method": found.method.value,
         "instrument": instrument,
         "north": frame.answer,
         "depth_reference": frame.depths.answer,
         "read_from": {"depth_reference": frame.depths.record, "height_m": frame.depths.height},
         "height_datum": frame.height_datum or None,
-        "origin_m": None if origin is None else list(origin),
+        "origin_m": None if grid is None else list(grid.origin),
+        "coordinates_north": None if grid is None else grid.north,
+        "grid_scale_factor": None if grid is None else grid.scale,
         "sigma": sigma,
-        "stations": station_rows(found, sigma, origin),
+        "stations": station_rows(found, sigma),
         "at": [station_at_depth(found, depth, sigma) for depth in request.md],
         "closure_m": float(found.closure_distance[-1]),
         "closure_azimuth_deg": math.degrees(found.closure_azimuth[-1]),

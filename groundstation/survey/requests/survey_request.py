@@ -39,9 +39,10 @@ class FrameRequest:
     north: str = "site"
     answer_north: str | None = None
     north_of_site_deg: float | None = None
-    convergence_deg: float = 0.0
+    convergence_deg: float | None = None
     declination_deg: float = 0.0
     origin: tuple[float, float, float] | None = None  # m, northing, easting, height of the point of zero
+    grid_scale_factor: float = 1.0  # metres of the grid a metre on the ground
     depth_reference: str = "collar"
     answer_depth_reference: str | None = None
     depth_reference_height_m: float | None = None  # of the former above the latter
@@ -53,7 +54,7 @@ class SurveyRequest:
     """A record, the method and the instrument, and what is to be answered, as ``borechain survey`` takes them."""
 
     file: Path
-    method: str = "balanced-tangential"
+    method: str | None = None  # that of the record's form where None: ``default_method``
     instrument: str = "relay"  # a name, or a file
     parameter: Mapping[str, float] = field(default_factory=dict)  # constants of the error model by their names
     sigma: float = 1.0  # standard deviations of the answer

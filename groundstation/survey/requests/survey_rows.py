@@ -12,12 +12,13 @@ from groundstation.survey.well.ellipsoid import hole_axes, plan_ellipse
 from groundstation.survey.well.methods import station_tangents
 from groundstation.survey.well.trajectory import TrajectoryPoint, interpolate_point
 
+COORDINATES = ("northing_m", "easting_m", "height_m")
 
-def station_rows(
-    found: Analysis, sigma: float, origin: tuple[float, float, float] | None = None
-) -> list[dict[str, Any]]:
-    """One object a station; uncertainty at ``sigma`` standard deviations, site coordinates from ``origin``."""
-    covs, rows = found.uncertainty.cov, []
+
+def station_rows(found: Analysis, sigma: float) -> list[dict[str, Any]]:
+    """One object a station; uncertainty at ``sigma`` standard deviations, site coordinates where there is a grid."""
+    covs, grid, rows = found.uncertainty.cov, found.frame.grid, []
+    coordinates = None if grid is None else grid.of_places(found.positions).tolist()
     for k, md in enumerate(found.md.tolist()):
         north, east, tvd = found.positions[k].tolist()
         severity = 0.0 if k == 0 else float(found.dogleg_severity[k - 1])
@@ -36,11 +37,7 @@ def station_rows(
                 "uncertainty": uncertainty_region(covs[k], sigma)
                 | highside_region(covs[k], sigma, found.record.inclination[k], found.azimuth[k]),
             }
-            | (
-                {}
-                if origin is None
-                else {"northing_m": origin[0] + north, "easting_m": origin[1] + east, "height_m": origin[2] - tvd}
-            )
+            | ({} if coordinates is None else dict(zip(COORDINATES, coordinates[k], strict=True)))
         )
     return rows
 

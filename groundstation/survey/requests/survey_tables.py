@@ -37,8 +37,9 @@ def station_table_text(rows: list[dict[str, Any]], frame: ReferenceFrame) -> str
     writer = csv.writer(text, lineterminator="\n")
     plain = [key for key in rows[0] if key != "uncertainty"]
     half = ("north_m", "east_m", "tvd_m")
-    writer.writerow([*plain, *(f"uncertainty_{key}" for key in half), *FRAME])
-    named = frame_words(frame)
+    of_grid = [] if frame.grid is None else ["coordinates_north"]
+    writer.writerow([*plain, *(f"uncertainty_{key}" for key in half), *FRAME, *of_grid])
+    named = frame_words(frame) + ([] if frame.grid is None else [frame.grid.north])
     writer.writerows(
         [[*(row[key] for key in plain), *(row["uncertainty"][key] for key in half), *named] for row in rows]
     )

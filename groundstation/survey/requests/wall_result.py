@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.survey.requests.survey_rows import COORDINATES
 from groundstation.survey.wall.as_built import ColumnState
 from groundstation.survey.wall.column_deviation import point_deviation
 from groundstation.survey.wall.column_joint import shift_margin
@@ -23,15 +24,19 @@ def wall_result(found: Wall, judgement: Judgement) -> dict[str, Any]:
     finite = np.where(np.isfinite(judged.thickness), judged.thickness, np.inf)
     doubtful_at, thinnest = worst_depths(judged), np.argmin(finite, axis=1)
     rows = [joint_row(found, judged, j, int(doubtful_at[j]), int(thinnest[j])) for j in range(len(judged.pairs))]
+    tight = [{"tight_from_m": top, "tight_to_m": bottom} for top, bottom in found.tight_depths.tolist()]
+    rows = [row | ends for row, ends in zip(rows, tight, strict=True)]
     joint, depth = worst_joint(judged)
-    worst_row = joint_row(found, judged, joint, depth, int(thinnest[joint]))
+    worst_row = joint_row(found, judged, joint, depth, int(thinnest[joint])) | tight[joint]
     return {
         "wall": found.file.name,
         "verdict": judgement.verdict.value,
         "north": found.file.north,
+        "stations_north": found.file.stations_north,
         "depth_reference": found.file.depth_reference,
         "read_from": {"depth_reference": found.file.depths_read_from, "height_m": found.file.reference_height},
         "height_datum": found.file.height_datum or None,
+        "coordinates_north": None if found.file.grid is None else found.file.grid.north,
         "findings": [finding_row(finding) for finding in judgement.findings],
         "probability_of_any": judgement.system.probability,
         "probability_of_any_standard_error": judgement.system.standard_error,
@@ -101,8 +106,11 @@ def proposed_column(found: Wall, extra: ExtraColumn | None) -> dict[str, Any] | 
     """A proposed column, placed where it is to begin; None where none is needed."""
     if extra is None:
         return None
-    north, east, down = (np.array([extra.north, extra.east, extra.from_depth]) @ found.built.frame).tolist()
-    return {
+    place = np.array([extra.north, extra.east, extra.from_depth]) @ found.built.frame
+    north, east, down = place.tolist()
+    grid = found.file.grid
+    coordinates = {} if grid is None else dict(zip(COORDINATES, grid.of_places(place).tolist(), strict=True))
+    return coordinates | {
         "north_m": north,
         "east_m": east,
         "down_m": down,

@@ -122,6 +122,11 @@ class SurveyTool:
             except ToolError as error:
                 raise ToolError(f"{self.name}: term {term.name}: {error}") from None
 
+    def asks_for(self, variable: str) -> bool:
+        """Whether a formula of the tool names a variable; case and underscores do not count."""
+        text = " ".join(formula for term in self.terms for formula in term.formulas).replace("_", "").lower()
+        return variable.lower() in text
+
     def without(self, *names: str) -> SurveyTool:
         """Return the tool less the terms of these names."""
         return self.with_terms(tuple(term for term in self.terms if term.name not in names))

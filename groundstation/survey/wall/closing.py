@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from groundstation.survey.wall.as_built import Columns, ColumnState
 from groundstation.survey.wall.column_joint import joint_thickness
-from groundstation.survey.wall.wall_joints import Detour
+from groundstation.survey.wall.wall_joints import Detour, joint_asked
 
 Array = npt.NDArray[np.float64]
 
@@ -38,6 +38,7 @@ def closing_by_day(
     required: float,
     days: Sequence[date | None],
     detours: Sequence[Detour] = (),
+    asked: npt.NDArray[np.bool_] | None = None,
 ) -> list[ClosingDay]:
     """Return the state of the wall at the end of every day of drilling.
 
@@ -46,6 +47,7 @@ def closing_by_day(
     pairs : (joints, 2) columns that are to join
     required : thickness of a joint, m
     days : of every column; None of one that is not drilled yet
+    asked : (joints, depths) where a joint is to be tight; where either of its designs is required if not given
     """
     order = np.array([math.inf if day is None else float(day.toordinal()) for day in days])
     distance, direct = _closing(columns, pairs, required, order)
@@ -53,7 +55,7 @@ def closing_by_day(
     for detour in detours:
         _, legs = _closing(columns, detour.pairs, required, order)
         closing[detour.joint] = np.minimum(closing[detour.joint], np.max(legs, axis=0))
-    asked = np.max(columns.states[pairs], axis=1) != ColumnState.OUTSIDE
+    asked = joint_asked(columns, pairs) if asked is None else asked
     both = np.max(order[pairs], axis=1)
     found = []
     for day in sorted({day for day in days if day is not None}):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
@@ -20,10 +20,12 @@ from groundstation.survey.tools.instruments import PropagationMode, SurveyTool
 from groundstation.survey.wall.as_built import TOE, Columns, ColumnState, intersect_planes, plane_frame
 from groundstation.survey.wall.column_deviation import ColumnDesign
 from groundstation.survey.wall.plane_errors import PlaneErrors
+from groundstation.survey.wall.tight_depths import TightRange
 from groundstation.survey.well.ellipsoid import check_covariance
 from groundstation.survey.well.error_columns import ErrorColumns, error_columns
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
 from groundstation.survey.well.methods import Method, station_positions, station_tangents
+from groundstation.survey.well.reference_frames import turn_north
 
 Array = npt.NDArray[np.float64]
 FLATTEST = 0.17  # cosine (80 deg) between a hole and the planes' normal, below which it is not cut by them
@@ -55,11 +57,16 @@ class ColumnPlan:
 
 @dataclass(frozen=True, slots=True)
 class ColumnSurvey:
-    """Stations (n,) of one column from its head on; none where it was not surveyed."""
+    """Stations (n,) of one column from its head on; none where it was not surveyed.
+
+    Azimuths count from the wall's north. ``record`` holds what else an instrument knows of every station, by the name
+    of its variable: the sigma of its yaw, of its forces.
+    """
 
     md: Array
     inclination: Array
     azimuth: Array
+    record: dict[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,12 +82,14 @@ class Layer:
 class Assumptions:
     """Assumptions for the whole wall."""
 
-    method: Method = Method.BALANCED_TANGENTIAL
+    method: Method = Method.MINIMUM_CURVATURE
     site: Site = field(default_factory=Site)
+    north: float = 0.0  # rad, azimuth from true north of the north that designs and stations count from
     wander: float = 0.01  # m/m, one standard deviation of where an unsurveyed length goes
     step: float = 0.5  # m between planes
     layers: tuple[Layer, ...] = (Layer(-math.inf, None, 0.0),)
     radius_correlation: float = 1.0  # of two columns in one layer
+    tight: TightRange = field(default_factory=TightRange)  # the planes lie in it
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +101,7 @@ class Way:
     azimuth: Array
     surveyed_md: float
     end_md: float
+    record: dict[str, Array]
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +126,7 @@ def build_wall(plans: Sequence[ColumnPlan], holes: Sequence[ColumnSurvey], assum
     """
     frame = plane_frame([plan.design for plan in plans])
     ways = [_way(plan, hole) for plan, hole in zip(plans, holes, strict=True)]
-    depths = _depths(plans, frame, assumed.step)
+    depths = _depths(plans, frame, assumed)
     count = len(plans)
     centres = np.full((count, len(depths), 2), np.nan)
     ends, surveyed = np.full((2, count), -np.inf)
@@ -186,30 +196,33 @@ def _way(plan: ColumnPlan, hole: ColumnSurvey) -> Way | None:
     if end < last - SAME_END:
         raise SurveyError(f"column {name}: stated as drilled to {end:g} m, yet surveyed at {last:g} m")
     if end <= last + SAME_END:
-        return Way(hole.md, hole.inclination, hole.azimuth, last, last)
+        return Way(hole.md, hole.inclination, hole.azimuth, last, last, hole.record)
     longer = [np.append(values, values[-1]) for values in (hole.md, hole.inclination, hole.azimuth)]
     longer[0][-1] = end
-    return Way(longer[0], longer[1], longer[2], last, end)
+    record = {name: np.append(values, values[-1]) for name, values in hole.record.items()}
+    return Way(longer[0], longer[1], longer[2], last, end, record)
 
 
 def _last_survey(way: Way) -> int:
     return int(np.flatnonzero(way.md <= way.surveyed_md + SAME_END)[-1])
 
 
-def _depths(plans: Sequence[ColumnPlan], frame: Array, step: float) -> Array:
-    """Planes from the first head to the last toe, at most ``step`` apart."""
+def _depths(plans: Sequence[ColumnPlan], frame: Array, assumed: Assumptions) -> Array:
+    """Planes at most a step apart, from the first head to the last toe or over what is stated to be tight."""
     heads = np.array([plan.design.head for plan in plans])
     toes = heads + np.array([plan.design.length * plan.design.axis for plan in plans])
     top, bottom = float(np.min(heads @ frame[2])), float(np.max(toes @ frame[2]))
-    return np.append(np.arange(top, bottom - 1e-3, step), bottom)
+    stated = assumed.tight
+    top, bottom = top if stated.top is None else stated.top, bottom if stated.bottom is None else stated.bottom
+    return np.append(np.arange(top, bottom - 1e-3, assumed.step), bottom)
 
 
 def _alike(plans: Sequence[ColumnPlan], ways: Sequence[Way | None]) -> list[list[int]]:
-    """Columns with as many stations of one tool, for one computation each; not too many at once."""
-    groups: dict[tuple[int, int], list[int]] = {}
+    """Columns with as many stations of one tool and one record, for one computation each; not too many at once."""
+    groups: dict[tuple[int, int, tuple[str, ...]], list[int]] = {}
     for k, (plan, way) in enumerate(zip(plans, ways, strict=True)):
         if way is not None:
-            groups.setdefault((len(way.md), id(plan.tool)), []).append(k)
+            groups.setdefault((len(way.md), id(plan.tool), tuple(sorted(way.record))), []).append(k)
     return [some[k : k + AT_ONCE] for some in groups.values() for k in range(0, len(some), AT_ONCE)]
 
 
@@ -220,8 +233,28 @@ def _survey(some: list[tuple[ColumnPlan, Way]], assumed: Assumptions) -> tuple[A
         np.stack([getattr(way, name) for way in ways]) for name in ("md", "inclination", "azimuth")
     )
     places = station_positions(assumed.method, md, inclination, azimuth)
-    survey = WellSurvey(md, inclination, azimuth, places[..., 2])
-    return places, station_tangents(inclination, azimuth), error_columns(survey, (Leg(some[0][0].tool),), assumed.site)
+    record = {name: np.stack([way.record[name] for way in ways]) for name in ways[0].record}
+    tool = some[0][0].tool
+    errors = survey_errors(WellSurvey(md, inclination, azimuth, places[..., 2], record), tool, assumed)
+    return places, station_tangents(inclination, azimuth), errors
+
+
+def survey_errors(survey: WellSurvey, tool: SurveyTool, assumed: Assumptions) -> list[ErrorColumns]:
+    """Errors of stations whose azimuths count from the wall's north, in its axes: models are evaluated from true north.
+
+    Raises
+    ------
+    ToolError
+        When a weight has no value at a station.
+    """
+    if assumed.north == 0.0:
+        return error_columns(survey, (Leg(tool),), assumed.site)
+    true = replace(survey, azimuth=survey.azimuth + assumed.north)
+    turn = turn_north(assumed.north)
+    return [
+        replace(found, effects=np.einsum("ij,...jm->...im", turn, found.effects))
+        for found in error_columns(true, (Leg(tool),), assumed.site)
+    ]
 
 
 def _key(source: ErrorColumns, plan: ColumnPlan) -> str | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -22,29 +22,44 @@ from groundstation.survey.wall.as_built import Columns
 from groundstation.survey.wall.closing import ClosingDay, closing_by_day
 from groundstation.survey.wall.column_deviation import Tolerance, parse_tolerance
 from groundstation.survey.wall.column_joint import largest_distance
+from groundstation.survey.wall.tight_depths import TightRange, asked_depths, check_reach, tight_depths
 from groundstation.survey.wall.wall_columns import Assumptions, BuiltWall, ColumnPlan, ColumnSurvey, Layer, build_wall
+from groundstation.survey.wall.wall_frames import FRAMES, NORTH_ANGLES, ORIGIN, PLACE, grid_of, norths_of, place_of
 from groundstation.survey.wall.wall_joints import Detour, neighbours_in_grid, neighbours_in_line
-from groundstation.survey.wall.wall_tables import Defaults, Remedy, read_heads, read_holes
+from groundstation.survey.wall.wall_stations import read_holes
+from groundstation.survey.wall.wall_tables import Defaults, Remedy, read_heads
 from groundstation.survey.wall.wall_verdict import Judgement, judge_columns
 from groundstation.survey.well.depth_reference import DEPTHS_FROM
-from groundstation.survey.well.error_sources import Site
 from groundstation.survey.well.methods import Method
-from groundstation.survey.well.reference_frames import NORTHS
+from groundstation.survey.well.reference_frames import SiteGrid
 
+Array = npt.NDArray[np.float64]
 LAYOUTS = ("line", "shaft", "grid")
 NEEDED = ("radius_m", "thickness_m", "heads", "stations")
-SIGNED = ("project", "client", "calibration", "north", "height_datum")  # of the report alone
+NAMED = ("project", "client", "calibration", "height_datum")  # of the report alone
 DEPTHS = ("depth_reference", "answer_depth_reference")
-TEXTS = ("name", "heads", "stations", "layout", "tolerance", "instrument", "serial", "method", *SIGNED, *DEPTHS)
+TEXTS = ("name", "heads", "stations", "layout", "tolerance", "instrument", "serial", "method", *NAMED, *FRAMES, *DEPTHS)
 REFERENCE_HEIGHT = "depth_reference_height_m"
-ORIGIN = ("northing_m", "easting_m", "height_m")
-POSITIVE = ("radius_m", "thickness_m", "spacing_m", "length_m", "depth_step_m", "gravity_mps2", "allowed_probability")
+TIGHT = ("tight_from_m", "tight_to_m")
+SIGNED = (*ORIGIN, *NORTH_ANGLES.values(), *TIGHT, REFERENCE_HEIGHT, *PLACE)  # may be negative
+POSITIVE = (
+    "radius_m",
+    "thickness_m",
+    "spacing_m",
+    "length_m",
+    "depth_step_m",
+    "gravity_mps2",
+    "allowed_probability",
+    "grid_scale_factor",
+    "field_nt",
+)
 NOT_NEGATIVE = (
     "radius_cv", "radius_correlation", "head_sigma_m", "unsurveyed_percent", "inclination_deg", "azimuth_deg",
 )  # fmt: skip
 MOST = {
     "allowed_probability": 0.5, "radius_cv": 0.5, "radius_correlation": 1.0, "unsurveyed_percent": 100.0,
-    "inclination_deg": 180.0, "azimuth_deg": 360.0,
+    "inclination_deg": 180.0, "azimuth_deg": 360.0, "dip_deg": 90.0, "latitude_deg": 90.0, "declination_deg": 180.0,
+    "convergence_deg": 180.0, "north_of_site_deg": 360.0,
 }  # fmt: skip
 LAYER_KEYS = ("from_m", "radius_m", "radius_cv")
 
@@ -73,12 +88,14 @@ class WallFile:
     project: str = ""
     client: str = ""
     calibration: str = ""  # certificate of the instrument
-    north: str = "site"  # to which azimuths and coordinates belong
+    north: str = "site"  # that designs, positions and every answer count from
+    stations_north: str = "site"
+    stations_turn: float = 0.0  # rad, azimuth of the north that stations count from, from ``north``
     depths_read_from: str = DEPTHS_FROM[0]  # of stations and drilled depths
     depth_reference: str = DEPTHS_FROM[0]  # of all answers: the heads' own
     reference_height: float | None = None  # m, of the former above the latter
     height_datum: str = ""
-    origin: tuple[float, float, float] | None = None  # m, northing, easting and height of the wall's zero
+    grid: SiteGrid | None = None  # site coordinates of positions from the wall's zero
 
     def digests(self) -> list[tuple[str, str]]:
         """Name and SHA-256 of each file as it is now."""
@@ -115,7 +132,17 @@ class Wall:
     @property
     def stages(self) -> list[ClosingDay]:
         """Closing of the wall day by day; empty where no day of drilling is stated."""
-        return closing_by_day(self.columns, self.pairs, self.file.thickness, self.drilled_on, self.detours)
+        return closing_by_day(self.columns, self.pairs, self.file.thickness, self.drilled_on, self.detours, self.asked)
+
+    @property
+    def tight_depths(self) -> Array:
+        """First and last depth (joints, 2) at which each joint is to be tight, m."""
+        return tight_depths([plan.design for plan in self.plans], self.built.frame, self.pairs, self.file.assumed.tight)
+
+    @property
+    def asked(self) -> npt.NDArray[np.bool_]:
+        """Whether each joint is to be tight at each depth (joints, depths)."""
+        return asked_depths(self.columns.depths, self.tight_depths)
 
     @property
     def grid_spacing(self) -> float | None:
@@ -139,7 +166,7 @@ def read_wall_file(path: Path) -> WallFile:
     except tomllib.TOMLDecodeError as error:
         raise SurveyError(f"{path}: not TOML: {error}") from error
     layers = data.pop("layer", [])
-    known = (*TEXTS, *POSITIVE, *NOT_NEGATIVE, *ORIGIN, REFERENCE_HEIGHT)
+    known = (*TEXTS, *POSITIVE, *NOT_NEGATIVE, *SIGNED)
     for key in data:
         if key not in known:
             raise SurveyError(f"{path}: {key}: unknown key; expected one of {', '.join(known)} or tables [[layer]]")
@@ -150,19 +177,23 @@ def read_wall_file(path: Path) -> WallFile:
     layout = _one_of(path, values, "layout", LAYOUTS, "line")
     if layout == "grid" and "spacing_m" not in values:
         raise SurveyError(f"{path}: spacing_m is missing; a grid needs it to know who is whose neighbour")
-    method = Method(_one_of(path, values, "method", tuple(m.value for m in Method), Method.BALANCED_TANGENTIAL.value))
+    method = Method(_one_of(path, values, "method", tuple(m.value for m in Method), Method.MINIMUM_CURVATURE.value))
     try:
         largest_distance(values["radius_m"], values["thickness_m"])
         allowed = parse_tolerance(values.get("tolerance", "en-12716"))
+        tight = TightRange(values.get("tight_from_m"), values.get("tight_to_m"))
     except SurveyError as error:
         raise SurveyError(f"{path}: {error}") from None
+    north, stations_north = norths_of(path, values)
     assumed = Assumptions(
         method,
-        Site(gravity=values.get("gravity_mps2", 9.81)),
+        place_of(values),
+        north,
         values.get("unsurveyed_percent", 1.0) / 100.0,
         values.get("depth_step_m", 0.5),
         _layers(path, layers, values.get("radius_cv", 0.0)),
         values.get("radius_correlation", 1.0),
+        tight,
     )
     read_from = _one_of(path, values, "depth_reference", DEPTHS_FROM, DEPTHS_FROM[0])
     return WallFile(
@@ -186,23 +217,15 @@ def read_wall_file(path: Path) -> WallFile:
         values.get("project", ""),
         values.get("client", ""),
         values.get("calibration", ""),
-        _one_of(path, values, "north", NORTHS, "site"),
+        str(values.get("north", "site")),
+        str(values.get("stations_north", values.get("north", "site"))),
+        stations_north - north,
         read_from,
         _one_of(path, values, "answer_depth_reference", DEPTHS_FROM, read_from),
         values.get(REFERENCE_HEIGHT),
         values.get("height_datum", ""),
-        _origin(path, values),
+        grid_of(path, values, north),
     )
-
-
-def _origin(path: Path, values: dict[str, Any]) -> tuple[float, float, float] | None:
-    """Site coordinates of the wall's zero, all three or none."""
-    stated = [key for key in ORIGIN if key in values]
-    if not stated:
-        return None
-    if len(stated) < len(ORIGIN):
-        raise SurveyError(f"{path}: expected {', '.join(ORIGIN)} together, got {', '.join(stated)}")
-    return float(values["northing_m"]), float(values["easting_m"]), float(values["height_m"])
 
 
 def instrument_path(path: Path, instrument: str) -> str:
@@ -223,12 +246,11 @@ def _value(path: Path, key: str, value: Any) -> Any:
             raise SurveyError(f"{path}: {key}: expected a text, got {value!r:.60}")
         return value
     usable = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
-    if usable and key in (*ORIGIN, REFERENCE_HEIGHT):
-        return float(value)
-    if not usable or value < 0.0 or (key in POSITIVE and value == 0.0):
-        sign = "positive" if key in POSITIVE else "non-negative"
+    signed = key in SIGNED
+    if not usable or (value < 0.0 and not signed) or (key in POSITIVE and value == 0.0):
+        sign = "positive" if key in POSITIVE else "finite" if signed else "non-negative"
         raise SurveyError(f"{path}: {key}: expected a {sign} number, got {value!r:.60}")
-    if value > MOST.get(key, math.inf):
+    if abs(value) > MOST.get(key, math.inf):
         raise SurveyError(f"{path}: {key}: expected at most {MOST[key]:g}, got {value!r:.60}")
     return float(value)
 
@@ -267,7 +289,8 @@ def read_wall(path: Path) -> Wall:
     file = read_wall_file(path)
     rows = read_heads(file.heads, file.defaults)
     names = [row.name for row in rows]
-    holes = read_holes(file.stations, names, [row.depths.height for row in rows])
+    surveys = read_holes(file.stations, [row.plan_without_length for row in rows], [row.depths.height for row in rows])
+    holes = [replace(hole, azimuth=hole.azimuth + file.stations_turn) for hole in surveys]
     length = file.length or max((float(hole.md[-1]) for hole in holes if len(hole.md)), default=0.0)
     if not length and any(row.length is None for row in rows):
         raise SurveyError(
@@ -280,7 +303,7 @@ def read_wall(path: Path) -> Wall:
         raise SurveyError(f"{path}: {error}") from None
     pairs = _pairs(file, [row.remedy for row in rows], built)
     detours = _detours(file.heads, names, [row.remedy for row in rows], pairs)
-    _check_design(file, built, pairs)
+    _check_design(file, plans, built, pairs, {detour.joint for detour in detours})
     return Wall(file, plans, built, pairs, detours, holes, [row.drilled_on for row in rows])
 
 
@@ -293,6 +316,7 @@ def judge_wall(wall: Wall) -> Judgement:
         allowed=wall.file.allowed,
         grid_spacing=wall.grid_spacing,
         detours=wall.detours,
+        asked=wall.asked,
     )
 
 
@@ -332,9 +356,20 @@ def _detours(path: Path, names: list[str], remedies: list[Remedy], pairs: npt.ND
     return found
 
 
-def _check_design(file: WallFile, built: BuiltWall, pairs: npt.NDArray[np.intp]) -> None:
-    """Refuse a wall none of whose joints could ever be thick enough, built exactly as designed."""
+def _check_design(
+    file: WallFile, plans: list[ColumnPlan], built: BuiltWall, pairs: npt.NDArray[np.intp], helped: set[int]
+) -> None:
+    """Refuse a wall none of whose joints could be thick enough, built as designed, or whose columns do not reach.
+
+    ``helped`` : joints that have a way by remedial columns, whose own designs need not reach
+    """
     columns = built.columns
+    alone = pairs[[j for j in range(len(pairs)) if j not in helped]]
+    designs = [plan.design for plan in plans]
+    try:
+        check_reach(designs, built.frame, alone, tight_depths(designs, built.frame, alone, file.assumed.tight))
+    except SurveyError as error:
+        raise SurveyError(f"{file.path}: {error}") from None
     a, b = pairs[:, 0], pairs[:, 1]
     apart = columns.planned[b] - columns.planned[a]
     distance = np.hypot(apart[..., 0], apart[..., 1])

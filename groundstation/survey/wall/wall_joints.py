@@ -1,6 +1,7 @@
 """Joints of a wall or grid: thickness of each at every depth and its chance to be too thin; who is whose neighbour.
 
-A joint is judged wherever both of its designs are required. Where one of its columns is missing it is open.
+A joint is judged over the depths in which it is to be tight; by default where either of its designs is required. Where
+one of its columns is missing there, or its design does not reach there, it is open.
 """
 
 from __future__ import annotations
@@ -31,18 +32,40 @@ class Joints:
     states: npt.NDArray[np.int8]  # the worse of the two columns
 
 
-def judge_joints(columns: Columns, pairs: npt.NDArray[np.intp], required: float) -> Joints:
-    """Judge every joint at every depth; ``required`` is the thickness in m."""
-    parts = [_joints(columns, pairs[k : k + AT_ONCE], required) for k in range(0, max(len(pairs), 1), AT_ONCE)]
+def judge_joints(
+    columns: Columns, pairs: npt.NDArray[np.intp], required: float, asked: npt.NDArray[np.bool_] | None = None
+) -> Joints:
+    """Judge every joint at every depth.
+
+    Parameters
+    ----------
+    required : thickness, m
+    asked : (joints, depths) where a joint is to be tight; where either of its designs is required if not given
+    """
+    asked = joint_asked(columns, pairs) if asked is None else asked
+    some = [slice(k, k + AT_ONCE) for k in range(0, max(len(pairs), 1), AT_ONCE)]
+    parts = [_joints(columns, pairs[k], required, asked[k]) for k in some]
     return Joints(*(np.concatenate([getattr(part, name) for part in parts]) for name in Joints.__slots__))
 
 
-def _joints(columns: Columns, pairs: npt.NDArray[np.intp], required: float) -> Joints:
+def joint_asked(columns: Columns, pairs: npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
+    """Whether either of the two designs is required (joints, depths)."""
+    return np.asarray(np.any(columns.states[pairs] != ColumnState.OUTSIDE, axis=1))
+
+
+def joint_states(columns: Columns, pairs: npt.NDArray[np.intp], asked: npt.NDArray[np.bool_]) -> npt.NDArray[np.int8]:
+    """State (joints, depths) of the worse of two columns; where its design does not reach one is missing."""
+    states = np.max(columns.states[pairs], axis=1)
+    states = np.where(states == ColumnState.OUTSIDE, np.int8(ColumnState.MISSING), states)
+    return np.where(asked, states, np.int8(ColumnState.OUTSIDE))
+
+
+def _joints(columns: Columns, pairs: npt.NDArray[np.intp], required: float, asked: npt.NDArray[np.bool_]) -> Joints:
     """Judge some pairs of columns at every depth."""
     a, b = pairs[:, 0], pairs[:, 1]
     apart = columns.centres[b] - columns.centres[a]
     distance = np.hypot(apart[..., 0], apart[..., 1])
-    states = np.maximum(columns.states[a], columns.states[b])
+    states = joint_states(columns, pairs, asked)
     known = states <= ColumnState.UNSURVEYED
     probability = np.where(states == ColumnState.MISSING, 1.0, np.nan)
     radii, radius_cov = pair_radii(columns, pairs)
@@ -138,13 +161,13 @@ class ExtraColumn:
 def extra_column(columns: Columns, found: Joints, joint: int, required: float) -> ExtraColumn | None:
     """A column along the planes' normal midway between two neighbours where their joint is too thin; None if nowhere.
 
-    Where one of the two is missing, its design stands for it in the place of the new column.
+    Where one of the two is missing, or its design does not reach, its axis is the place of the new column.
     """
     thin = np.flatnonzero((found.thickness[joint] < required) | (found.states[joint] == ColumnState.MISSING))
     if not len(thin):
         return None
     a, b = (int(k) for k in found.pairs[joint])
-    gone = [k for k in (a, b) if np.any(columns.states[k, thin] == ColumnState.MISSING)]
+    gone = [k for k in (a, b) if np.any(columns.states[k, thin] >= ColumnState.MISSING)]
     if gone:
         north, east = columns.planned[gone[0], thin[0]]
         kept = [columns.centres[k, thin] for k in (a, b) if k not in gone]

@@ -1,4 +1,4 @@
-"""The two tables of a wall: heads (one column a row, with what sets it apart) and stations.
+"""The heads of a wall as a table: one column a row, with what sets it apart.
 
 Every refusal names file, line, column, what was expected and what came.
 """
@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from datetime import date
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +17,8 @@ from groundstation.errors import SurveyError
 from groundstation.survey.files.survey_records import read_columns
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
 from groundstation.survey.wall.column_deviation import ColumnDesign, Tolerance, parse_tolerance
-from groundstation.survey.wall.wall_columns import ColumnPlan, ColumnStatus, ColumnSurvey
+from groundstation.survey.wall.wall_columns import ColumnPlan, ColumnStatus
 from groundstation.survey.well.depth_reference import DEPTHS_FROM, DepthReference, depth_reference
-from groundstation.survey.well.reference_frames import SAME_DEPTH
 
 Array = npt.NDArray[np.float64]
 NUMBERS = (
@@ -98,9 +96,11 @@ def read_heads(path: Path, defaults: Defaults) -> list[HeadRow]:
     for line, name in zip(lines, names, strict=True):
         if not name:
             raise SurveyError(f"{path}: line {line}: expected the name of a column")
-        if name in seen:
-            raise SurveyError(f"{path}: line {line}: column {name} stands in line {seen[name]} already")
-        seen[name] = line
+        first = seen.setdefault(name.casefold(), line)
+        if first != line:
+            other = names[lines.index(first)]
+            differs = "" if other == name else f" as {other}; expected names that differ by more than case"
+            raise SurveyError(f"{path}: line {line}: column {name} stands in line {first} already{differs}")
     heads = np.stack([table["north_m"], table["east_m"]], axis=1)
     wrong = np.flatnonzero(~np.isfinite(heads).all(axis=1))
     if len(wrong):
@@ -189,78 +189,3 @@ def _remedy(where: str, cells: dict[str, str]) -> Remedy:
     if between and (len(between) != 2 or between[0] == between[1]):
         raise SurveyError(f"{where}: between: expected two columns as NAME/NAME, got {cells['between']!r}")
     return Remedy(between, cells.get("replaces", ""))
-
-
-def read_holes(path: Path, names: list[str], heights: list[float]) -> list[ColumnSurvey]:
-    """Stations of every column in the order of ``names``; none of one that was not surveyed.
-
-    Depths of a column are brought to its head by ``heights`` (m), how far what they count from lies above it. A station
-    at 0 m there tells the direction at the head, for between the two the string is straight.
-
-    Raises
-    ------
-    SurveyError
-        Names file, line and column.
-    """
-    needed = ("column", "md_m", "inclination_deg", "azimuth_deg")
-    table, lines = read_columns(path, needed, texts=("column",))
-    index = {name: k for k, name in enumerate(names)}
-    owner = np.array([index.get(str(name), -1) for name in table["column"]], np.intp)
-    unknown = np.flatnonzero(owner < 0)
-    if len(unknown):
-        k = int(unknown[0])
-        raise SurveyError(f"{path}: line {lines[k]}: column {table['column'][k]} is not among the heads")
-    order = np.argsort(owner, kind="stable")
-    owner, md, inc, azi = owner[order], *(table[name][order] for name in needed[1:])
-    line = np.array(lines, np.intp)[order]
-    _check_values(path, line, md, inc, azi)
-    counts = np.bincount(owner, minlength=len(names))
-    single = np.flatnonzero(counts == 1)
-    if len(single):
-        raise SurveyError(f"{path}: column {names[single[0]]}: expected at least two stations, got 1")
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    lift = np.array(heights)[owner]
-    at_reference = (np.arange(len(md)) == starts[owner]) & (md == 0.0) & (lift > 0.0)
-    md = np.where(at_reference | (np.abs(md - lift) < SAME_DEPTH), 0.0, md - lift)
-    _check_depths(path, names, owner, line, md, starts[:-1][counts > 0])
-    parts = [slice(a, b) for a, b in pairwise(starts)]
-    return [ColumnSurvey(md[part], np.radians(inc[part]), np.radians(azi[part])) for part in parts]
-
-
-def _check_depths(
-    path: Path,
-    names: list[str],
-    owner: npt.NDArray[np.intp],
-    line: npt.NDArray[np.intp],
-    md: Array,
-    starts: npt.NDArray[np.intp],
-) -> None:
-    same = np.ones(len(md), bool)
-    same[starts] = False
-    back = np.flatnonzero(same[1:] & ~(np.diff(md) > 0.0)) + 1
-    if len(back):
-        k = int(back[0])
-        raise SurveyError(
-            f"{path}: line {line[k]}: column {names[owner[k]]}: "
-            f"expected a depth beyond {md[k - 1]:g} m, got {md[k]:g} m"
-        )
-    off = starts[md[starts] != 0.0]
-    if len(off):
-        k = int(off[0])
-        raise SurveyError(
-            f"{path}: line {line[k]}: column {names[owner[k]]}: "
-            f"expected the head first, got a station {md[k]:g} m below it"
-        )
-
-
-def _check_values(
-    path: Path, line: npt.NDArray[np.intp], md: Array, inclination_deg: Array, azimuth_deg: Array
-) -> None:
-    for name, values, good in (
-        ("a finite md_m", md, np.isfinite(md)),
-        ("an inclination of 0..180 deg", inclination_deg, (inclination_deg >= 0.0) & (inclination_deg <= 180.0)),
-        ("a finite azimuth_deg", azimuth_deg, np.isfinite(azimuth_deg)),
-    ):
-        wrong = np.flatnonzero(~good)
-        if len(wrong):
-            raise SurveyError(f"{path}: line {line[wrong[0]]}: expected {name}, got {values[wrong[0]]:g}")

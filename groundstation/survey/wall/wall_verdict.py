@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.column_joint import limit_distances
 from groundstation.survey.wall.void_chance import VoidChance, void_chance
 from groundstation.survey.wall.voids import Void, find_voids, triples_of
 from groundstation.survey.wall.wall_joints import (
@@ -49,6 +50,7 @@ class FindingKind(Enum):
     CROSSING = "crossing"  # two neighbours have changed sides
     DOUBTFUL = "doubtful"  # thick enough as surveyed, too thin with more than the allowed probability
     SYSTEM = "system"  # every joint good, the whole doubtful
+    DESIGN = "design"  # what is open there would be open as designed
 
 
 OPEN = (FindingKind.MISSING, FindingKind.THIN, FindingKind.VOID, FindingKind.CROSSING)
@@ -95,6 +97,7 @@ def judge_columns(
     allowed: float = 0.01,
     grid_spacing: float | None = None,
     detours: Sequence[Detour] = (),
+    asked: npt.NDArray[np.bool_] | None = None,
 ) -> Judgement:
     """Judge all joints, the plane of a grid, and the whole.
 
@@ -104,8 +107,9 @@ def judge_columns(
     allowed : probability of anything too thin or open up to which the wall counts as tight
     grid_spacing : of a grid, m; its plane must be covered too
     detours : ways by remedial columns
+    asked : (joints, depths) where a joint is to be tight; where either of its designs is required if not given
     """
-    found = with_detours(columns, judge_joints(columns, pairs, required), detours, required)
+    found = with_detours(columns, judge_joints(columns, pairs, required, asked), detours, required)
     holes: list[VoidFinding] = []
     triples = chance = None
     if grid_spacing is not None:
@@ -116,6 +120,7 @@ def judge_columns(
     findings = [
         *_column_findings(columns),
         *_joint_findings(columns, found, required, allowed),
+        *_design_findings(columns, found, required, allowed),
         *_void_findings(columns, holes),
         *_likely_voids(columns, holes, chance, allowed),
         *_crossing_findings(columns, pairs),
@@ -182,6 +187,37 @@ def _joint_findings(columns: Columns, found: Joints, required: float, allowed: f
             top, bottom, most = float(columns.depths[first]), float(columns.depths[last]), float(np.max(chance[likely]))
             text = f"joint {name} is too thin with a probability of {most:.2g} between {top:g} and {bottom:g} m"
             out.append(Finding(FindingKind.DOUBTFUL, name, top, bottom, text, most))
+    return out
+
+
+def _design_findings(columns: Columns, found: Joints, required: float, allowed: float) -> list[Finding]:
+    """Where a joint is not good and could not be by its design: a column that does not reach, or axes too far apart."""
+    out = []
+    a, b = found.pairs[:, 0], found.pairs[:, 1]
+    apart = np.linalg.norm(columns.planned[b] - columns.planned[a], axis=-1)
+    limit = limit_distances(columns.radii[a], columns.radii[b], required)
+    with np.errstate(invalid="ignore"):
+        good = (found.thickness >= required) & (found.probability <= allowed)
+    bad = ~good & (found.states != ColumnState.OUTSIDE)
+    for j in np.flatnonzero(np.any(bad, axis=1)).tolist():
+        pair = found.pairs[j]
+        name = joint_name(columns, pair)
+        for k in pair.tolist():
+            for first, last in true_runs(bad[j] & (columns.states[k] == ColumnState.OUTSIDE)):
+                top, bottom = float(columns.depths[first]), float(columns.depths[last])
+                text = (
+                    f"joint {name} is open from {top:g} to {bottom:g} m: no column {columns.names[k]} is designed there"
+                )
+                out.append(Finding(FindingKind.MISSING, name, top, bottom, text))
+        wide = bad[j] & (apart[j] > limit[j] + 1e-9)
+        for first, last in true_runs(wide):
+            top, bottom = float(columns.depths[first]), float(columns.depths[last])
+            most = first + int(np.argmax(apart[j, first : last + 1]))
+            text = (
+                f"the design of joint {name} opens from {top:g} to {bottom:g} m: its axes are up to "
+                f"{apart[j, most]:.3f} m apart, a joint of {required:g} m needs {limit[j, most]:.3f} m or less"
+            )
+            out.append(Finding(FindingKind.DESIGN, name, top, bottom, text))
     return out
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +15,9 @@ from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, 
 from groundstation.survey.well.compiled_model import locate_stations
 from groundstation.survey.well.error_propagation import Uncertainty
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
+from groundstation.survey.well.leg_errors import covariance_at
 from groundstation.survey.well.methods import Method, dogleg_severity, horizontal_closure, vertical_section
-from groundstation.survey.well.reference_frames import SAME_DEPTH, Norths, ReferenceFrame, TieOn
+from groundstation.survey.well.reference_frames import SAME_DEPTH, ReferenceFrame, TieOn, turn_north
 from groundstation.survey.well.well_record import SurveyRecord
 
 Array = npt.NDArray[np.float64]
@@ -28,6 +29,16 @@ RECORD_COLUMNS = {
     "measurements": ("Readings", 1.0),
     "time_s": ("Time", 1.0),
 }
+
+
+def record_variables(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Further columns of a record as variables of formulas, SI and rad; without those that are none."""
+    return {name: columns[c] * factor for c, (name, factor) in RECORD_COLUMNS.items() if c in columns}
+
+
+def default_method(record: SurveyRecord) -> Method:
+    """Minimum curvature; of lateral displacements balanced tangential, with which their form was published."""
+    return Method.BALANCED_TANGENTIAL if record.of_displacements else Method.MINIMUM_CURVATURE
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +56,8 @@ class Region:
         return turned + self.tie_cov if self.tie_cov.any() else turned
 
     def at(self, md: float) -> Array:
-        """Covariance (3, 3) at any depth of the survey; errors as ``Uncertainty.at``."""
-        return self._turned(self.model.at(md)) + self.tie_cov
+        """Covariance (3, 3) at any depth of the survey; errors as ``covariance_at``."""
+        return self._turned(covariance_at(self.model, md)) + self.tie_cov
 
     def by_source(self) -> dict[str, Array]:
         """Covariance (n, 3, 3) by the name of its source; ``tie-on`` is what was there before."""
@@ -69,6 +80,7 @@ class Analysis:
     """Positions (n, 3) with what follows from them, all in one frame; m and rad, north east down."""
 
     record: SurveyRecord
+    method: Method
     frame: ReferenceFrame
     azimuth: Array  # (n,) from the answer's north
     positions: Array
@@ -84,7 +96,7 @@ class Analysis:
         return self.frame.depths.to_answer(self.record.md)
 
     def covariance_at(self, md: float) -> Array:
-        """Covariance (3, 3, m^2) at any depth of the answer; errors as ``Uncertainty.at``."""
+        """Covariance (3, 3, m^2) at any depth of the answer; errors as ``Region.at``."""
         return self.uncertainty.at(self.frame.depths.to_record(md))
 
 
@@ -139,9 +151,8 @@ def analyse_survey(
     azimuth = frame.to_true(record.azimuth)
     start = np.array([0.0, 0.0, height if at_zero else 0.0])
     if tie_on is not None:
-        start = _turn(-frame.norths.of(frame.record)) @ tie_on.position
-    extra = {name: record.columns[c] * f for c, (name, f) in RECORD_COLUMNS.items() if c in record.columns}
-    survey = WellSurvey(record.md, record.inclination, azimuth, record.md, extra)
+        start = turn_north(-frame.norths.of(frame.record)) @ tie_on.position
+    survey = WellSurvey(record.md, record.inclination, azimuth, record.md, record_variables(record.columns))
     legs = [Leg(tool)] if isinstance(tool, SurveyTool) else legs_of(tool, record.md)
     allowance = tie_on is None and legs[0].tool.slot_allowance
     places, found = locate_stations(method, survey, legs, site, start, slot_allowance=allowance)
@@ -149,10 +160,11 @@ def analyse_survey(
     distance, direction = horizontal_closure(turned)
     tie_cov = np.zeros((3, 3))
     if tie_on is not None:
-        from_record = frame.turn @ _turn(-frame.norths.of(frame.record))
+        from_record = frame.turn @ turn_north(-frame.norths.of(frame.record))
         tie_cov = from_record @ tie_on.cov @ from_record.T
     return Analysis(
         record,
+        method,
         frame,
         frame.azimuth(azimuth),
         turned,
@@ -164,11 +176,6 @@ def analyse_survey(
     )
 
 
-def _turn(angle: float) -> Array:
-    """Matrix (3, 3) into axes whose north lies at ``angle`` (rad)."""
-    return ReferenceFrame(answer="site", norths=Norths(site=angle)).turn
-
-
 def _tied(record: SurveyRecord, tie_on: TieOn) -> SurveyRecord:
     """The record from its tie-on down; what else it holds there is that of its first station."""
     keep = slice(1, None) if record.md[0] <= tie_on.md + SAME_DEPTH else slice(None)
@@ -177,7 +184,7 @@ def _tied(record: SurveyRecord, tie_on: TieOn) -> SurveyRecord:
     columns = {name: np.concatenate([values[:1], values[keep]]) for name, values in record.columns.items()}
     if len(md) < 2:
         raise SurveyError(f"tie-on: expected a station below {tie_on.md:g} m, got none")
-    return SurveyRecord(md, inclination, azimuth, [0, *record.lines[keep]], columns)
+    return SurveyRecord(md, inclination, azimuth, [0, *record.lines[keep]], columns, record.of_displacements)
 
 
 def legs_of(parts: Sequence[Stretch], md: Array) -> list[Leg]:

@@ -1,16 +1,15 @@
-"""Clearance between two holes: closest approach, correlated uncertainty and separation factor.
+"""Clearance between two holes: closest approach, correlated uncertainty and separation factor, all along both arcs.
 
     SF = (D - R_r - R_o - S_m) / (k sqrt(sigma_s^2 + sigma_pa^2)),    sigma_s^2 = u^T (C_r + C_o - C_ro - C_ro^T) u
 
-D is the distance of a station of the reference hole from the nearest point of the offset hole, u its direction. What
+D is the distance of a point of the reference hole from the nearest point of the offset hole, u its direction. What
 both holes err alike, global sources and those of one instrument, cancels by C_ro where they run alike, and adds where
-they run against each other. Frame: north, east, down; m.
-Source: Sawaryn et al., SPE 187073-PA.
+they run against each other. It is told at every station, and where it is least between them: holes may cross between
+two stations that are far apart. Frame: north, east, down; m. Source: Sawaryn et al., SPE 187073-PA.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,12 +17,16 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import PropagationMode
-from groundstation.survey.well.error_columns import ErrorColumns, error_columns
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
-from groundstation.survey.well.methods import station_tangents
+from groundstation.survey.well.hole_arcs import HoleArcs
+from groundstation.survey.well.leg_errors import LegErrors, SourceKey, leg_errors
+from groundstation.survey.well.methods import check_stations, station_tangents
+from groundstation.survey.well.path_search import least_place, leg_of, sample_places
 
 Array = npt.NDArray[np.float64]
-PIECES = 16  # of a leg, between which the nearest point is sought on a line
+TOUCHING = 1e-9  # m, of two points between which there is no direction
+SAME_HOLE = 1e-6  # m, within which one hole runs in the other
+PARALLEL = 1e-6  # sine of the angle of two holes that have no common perpendicular of their own
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,109 +50,127 @@ class Rule:
 
 
 @dataclass(frozen=True, slots=True)
-class Clearance:
-    """At every station (n,) of the reference hole: the nearest point of the offset hole, and how far away it is."""
+class Separations:
+    """At points (k,) of the reference hole: the nearest point of the offset hole, and how far away it is."""
 
+    md: Array
     offset_md: Array
     distance: Array  # m, between the centres
     sigma: Array  # m, of the distance
     factor: Array  # SF
     independent_factor: Array  # the published rule: as if the two shared no error
 
+    @property
+    def least_factor(self) -> Array:
+        """The lesser (k,) of both factors, which decides."""
+        return np.minimum(self.factor, self.independent_factor)
+
+
+@dataclass(frozen=True, slots=True)
+class Clearance:
+    """Separations at the stations of the reference hole; and, stations or not, the one place each of two least ones."""
+
+    stations: Separations
+    least: Separations  # of the factor
+    nearest: Separations  # of the distance
+
+    @property
+    def clear(self) -> bool:
+        """Whether both factors are above 1 all along."""
+        return bool(self.least.least_factor[0] > 1.0)
+
 
 def clearance_between(
     reference: ClearanceHole, offset: ClearanceHole, site: Site, rule: Rule | None = None
 ) -> Clearance:
-    """Clearance of every station of one hole from another.
+    """Clearance of one hole from another, at its stations and between them.
 
     Raises
     ------
     SurveyError, ToolError
-        When a radius is negative, or a weight of an instrument has no value.
+        When a hole is not a survey, a radius is negative, one hole is the other, or a weight of an instrument has no
+        value.
     """
-    rule = rule or Rule()
-    for hole in (reference, offset):
+    for name, hole in (("reference", reference), ("offset", offset)):
+        check_stations(hole.survey.md, hole.survey.inclination, hole.survey.azimuth, f"clearance: {name} hole")
         if not hole.radius >= 0.0:
             raise SurveyError(f"clearance: expected a radius of the hole of 0 m or more, got {hole.radius:g} m")
-    leg, fraction, nearest = _nearest(reference.positions, offset)
-    apart = reference.positions - nearest
-    distance = np.linalg.norm(apart, axis=-1)
-    across = np.where(distance[:, None] > 1e-9, apart / np.maximum(distance, 1e-9)[:, None], _aside(reference))
-    mine = _along(error_columns(reference.survey, reference.legs, site), across)
-    theirs = _along(_between(error_columns(offset.survey, offset.legs, site), leg, fraction), across)
-    variance = np.zeros(len(distance))
-    for columns in (mine, theirs):
-        for _, effects in columns:
-            variance += np.sum(effects**2, axis=-1)
-    shared = np.zeros(len(distance))
-    keys = {key: effects for key, effects in theirs if _is_shared(key, reference, offset)}
-    for key, effects in mine:
-        if key in keys:
-            shared += np.sum(effects * keys[key], axis=-1)
-    sigma = np.sqrt(np.maximum(variance - 2.0 * shared, 0.0))
-    room = distance - reference.radius - offset.radius - rule.margin
-    factor, independent = (room / (rule.k * np.hypot(size, rule.sigma_ahead)) for size in (sigma, np.sqrt(variance)))
-    offset_md = (1.0 - fraction) * offset.survey.md[leg] + fraction * offset.survey.md[leg + 1]
-    return Clearance(offset_md, distance, sigma, factor, independent)
+    pair = HolePair(reference, offset, site, rule or Rule())
+    stations = np.arange(len(reference.survey.md), dtype=float)
+    places, apart = sample_places(pair.distance, pair.mine.length)
+    if float(apart.max()) < SAME_HOLE:
+        raise SurveyError("clearance: the reference hole runs in the offset hole all along; expected two holes")
+    factors = pair.separations(places).least_factor
+    least = least_place(lambda place: pair.separations(place).least_factor, places, factors)
+    nearest = least_place(pair.distance, places, apart)
+    return Clearance(*(pair.separations(place) for place in (stations, np.array([least]), np.array([nearest]))))
 
 
-Key = tuple[str, PropagationMode]
+class HolePair:
+    """Two holes, compared at any places along the reference hole: number of a leg plus fraction of it."""
+
+    def __init__(self, reference: ClearanceHole, offset: ClearanceHole, site: Site, rule: Rule) -> None:
+        self._reference, self._offset, self._rule = reference, offset, rule
+        self.mine, self.theirs = (_arcs(hole) for hole in (reference, offset))
+        self._errors = tuple(leg_errors(hole.survey, hole.legs, site) for hole in (reference, offset))
+        self._shared = [key for key in self._errors[0].constant if self._is_shared(key)]
+
+    def _is_shared(self, key: SourceKey) -> bool:
+        """Whether both holes have an error of this source, and the same."""
+        if key not in self._errors[1].constant:
+            return False
+        one_instrument = self._reference.serial != "" and self._reference.serial == self._offset.serial
+        return key[1] is PropagationMode.GLOBAL or one_instrument
+
+    def distance(self, place: Array) -> Array:
+        """Distance (k,) of the offset hole from places (k,)."""
+        return self.theirs.nearest(self.mine.places(*leg_of(place, len(self.mine.length))))[2]
+
+    def separations(self, place: Array) -> Separations:
+        """Everything at places (k,)."""
+        leg, fraction = leg_of(place, len(self.mine.length))
+        points = self.mine.places(leg, fraction)
+        their_leg, their_fraction, distance = self.theirs.nearest(points)
+        apart = points - self.theirs.places(their_leg, their_fraction)
+        across = self._across(leg, fraction, their_leg, their_fraction)
+        meet = distance < TOUCHING
+        unit = np.where(meet[:, None], across, apart / np.maximum(distance, TOUCHING)[:, None])
+        here, there = (self._errors[0], leg, fraction), (self._errors[1], their_leg, their_fraction)
+        variance = sum(_variance(*where, unit) for where in (here, there))
+        common = np.zeros(len(place))
+        for key in self._shared:
+            effects = [np.sum(errors.effect(key, at, f) * unit, axis=-1) for errors, at, f in (here, there)]
+            common += effects[0] * effects[1]
+        sigma = np.sqrt(np.maximum(variance - 2.0 * common, 0.0))
+        room = distance - self._reference.radius - self._offset.radius - self._rule.margin
+        ahead = self._rule.sigma_ahead
+        factor, independent = (
+            room / (self._rule.k * np.maximum(np.hypot(size, ahead), TOUCHING)) for size in (sigma, np.sqrt(variance))
+        )
+        mds = (_md(self._reference, leg, fraction), _md(self._offset, their_leg, their_fraction))
+        return Separations(*mds, distance, sigma, factor, independent)
+
+    def _across(self, leg: npt.NDArray[np.intp], fraction: Array, other: npt.NDArray[np.intp], part: Array) -> Array:
+        """Unit vector (k, 3) of holes that meet: across both, or across the first one where they run alike."""
+        along = self.mine.tangents(leg, fraction)
+        normal = np.cross(along, self.theirs.tangents(other, part))
+        size = np.linalg.norm(normal, axis=-1)
+        azimuth = self._reference.survey.azimuth[leg]
+        aside = np.stack([-np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)], axis=-1)
+        crossing = (size > PARALLEL)[:, None]
+        return np.where(crossing, normal / np.maximum(size, PARALLEL)[:, None], aside)
 
 
-def _is_shared(key: Key, reference: ClearanceHole, offset: ClearanceHole) -> bool:
-    if key[1] is PropagationMode.GLOBAL:
-        return True
-    return (
-        key[1] in (PropagationMode.SYSTEMATIC, PropagationMode.WELL)
-        and reference.serial != ""
-        and reference.serial == offset.serial
+def _variance(errors: LegErrors, leg: npt.NDArray[np.intp], fraction: Array, unit: Array) -> Array:
+    """Variance (k,) along unit vectors (k, 3)."""
+    return np.asarray(np.maximum(np.einsum("ki,kij,kj->k", unit, errors.covariance(leg, fraction), unit), 0.0))
+
+
+def _arcs(hole: ClearanceHole) -> HoleArcs:
+    return HoleArcs.of_stations(
+        hole.survey.md, hole.positions, station_tangents(hole.survey.inclination, hole.survey.azimuth)
     )
 
 
-def _along(columns: Sequence[ErrorColumns], direction: Array) -> list[tuple[Key, Array]]:
-    """Effects (n, m) of every source along unit vectors (n, 3)."""
-    return [((c.name, c.mode), np.einsum("nam,na->nm", c.effects, direction)) for c in columns]
-
-
-def _between(columns: Sequence[ErrorColumns], leg: npt.NDArray[np.int64], fraction: Array) -> list[ErrorColumns]:
-    """Errors of points at fractions of legs: those of the two stations, blended as the hole is."""
-    f = fraction[:, None, None]
-    return [ErrorColumns(c.name, c.mode, (1.0 - f) * c.effects[leg] + f * c.effects[leg + 1]) for c in columns]
-
-
-def _aside(hole: ClearanceHole) -> Array:
-    """Unit vector (n, 3) across each station, for holes that meet."""
-    inclination, azimuth = hole.survey.inclination, hole.survey.azimuth
-    return np.stack([-np.sin(azimuth), np.cos(azimuth), np.zeros_like(inclination)], axis=-1)
-
-
-def _nearest(points: Array, hole: ClearanceHole) -> tuple[npt.NDArray[np.int64], Array, Array]:
-    """Leg (n,), fraction of its length (n,) and place (n, 3) of the nearest point of a hole."""
-    path, at = _path(hole)
-    begin, step = path[:-1], np.diff(path, axis=0)
-    length2 = np.maximum(np.sum(step**2, axis=-1), 1e-30)
-    along = np.clip(np.einsum("nsa,sa->ns", points[:, None, :] - begin, step) / length2, 0.0, 1.0)
-    gaps = np.linalg.norm(points[:, None, :] - begin - along[..., None] * step, axis=-1)
-    best = np.argmin(gaps, axis=1)
-    rows = np.arange(len(points))
-    f = along[rows, best]
-    places = begin[best] + f[:, None] * step[best]
-    place = (1.0 - f) * at[best] + f * at[best + 1]
-    leg = np.minimum(place.astype(np.int64), len(hole.positions) - 2)
-    return leg, place - leg, places
-
-
-def _path(hole: ClearanceHole) -> tuple[Array, Array]:
-    """Points (s, 3) of the arcs of a hole, and the station that each is at, with its fraction."""
-    t = station_tangents(hole.survey.inclination, hole.survey.azimuth)
-    f = np.arange(PIECES)[:, None, None] / PIECES
-    p0, p1, d = hole.positions[:-1], hole.positions[1:], np.diff(hole.survey.md)[:, None]
-    # the curve that has the two stations' positions and directions; between them an arc of the same bend
-    curve = (
-        p0 * (1.0 + 2.0 * f) * (1.0 - f) ** 2
-        + p1 * f**2 * (3.0 - 2.0 * f)
-        + d * t[:-1] * f * (1.0 - f) ** 2
-        - d * t[1:] * f**2 * (1.0 - f)
-    )
-    points = np.concatenate([np.moveaxis(curve, 0, 1).reshape(-1, 3), hole.positions[-1:]])
-    return points, np.arange(len(points)) / PIECES
+def _md(hole: ClearanceHole, leg: npt.NDArray[np.intp], fraction: Array) -> Array:
+    return np.asarray((1.0 - fraction) * hole.survey.md[leg] + fraction * hole.survey.md[leg + 1])

@@ -47,10 +47,19 @@ class Propagation:
     """Effects of sources on the positions of one survey, one source at a time in the same few arrays.
 
     ``inner`` (3, ..., n - 1) is e_k and ``last`` e*_k of the source asked for last, m, of the stations from the second;
-    of a source that acts on two axes the first two rows alone are written.
+    of a source that acts on two axes the first two rows alone are written. ``turned`` is by how much their downhole
+    unit vectors err, rad, where that is asked for.
     """
 
-    def __init__(self, survey: WellSurvey, legs: Sequence[Leg], site: Site, geometry: SurveyGeometry) -> None:
+    def __init__(
+        self,
+        survey: WellSurvey,
+        legs: Sequence[Leg],
+        site: Site,
+        geometry: SurveyGeometry,
+        *,
+        with_turns: bool = False,
+    ) -> None:
         self._geometry = g = geometry
         self._legs = legs
         self._inclination = survey.inclination
@@ -67,6 +76,7 @@ class Propagation:
             self._weights.append(weights)
         self.inner = np.empty((3, *g.upper.shape))
         self.last = np.empty((3, *g.upper.shape))
+        self.turned = np.zeros((3, *g.upper.shape)) if with_turns else None
         self._work = np.empty(g.upper.shape)
 
     def evaluate(self, source: ErrorSource) -> None:
@@ -82,13 +92,18 @@ class Propagation:
             self._row(*source.rows[0])
             return
         inner, last = np.zeros_like(self.inner), np.zeros_like(self.last)
+        turned = None if self.turned is None else np.zeros_like(self.turned)
         for row in source.rows:
             self._row(*row)
             begin = self._legs[row[0]].first - 1
             end = self._legs[row[0] + 1].first - 1 if row[0] + 1 < len(self._legs) else None
             inner[..., begin:end] += self.inner[..., begin:end]
             last[..., begin:end] += self.last[..., begin:end]
+            if turned is not None and self.turned is not None:
+                turned[..., begin:end] += self.turned[..., begin:end]
         self.inner[...], self.last[...] = inner, last
+        if turned is not None and self.turned is not None:
+            self.turned[...] = turned
 
     def sums(self) -> Iterator[Array]:
         """Effects (axes, ..., n - 1) on every position of the source, if it stays the same: one for every section.
@@ -111,6 +126,9 @@ class Propagation:
             last[...] = 0.0
         else:
             self._turn(term, flat[1] * sigma, flat[2] * sigma, flat[3:6])
+        if self.turned is not None:
+            self.turned[...] = 0.0
+            self.turned[: self._axes] = last
         np.multiply(last, g.both, out=inner)
         last *= g.upper
         if not is_zero(term.weights[0]):
@@ -220,41 +238,9 @@ class Uncertainty:
             sums.add_to(out)
         return found
 
-    def at(self, md: float) -> Array:
-        """Covariance (3, 3) at any depth of one well: errors of the two stations around it, blended as the hole is.
-
-        Raises
-        ------
-        SurveyError
-            When ``md`` is outside the survey.
-        """
-        mds = self.survey.md
-        if not mds[0] <= md <= mds[-1]:
-            raise SurveyError(f"uncertainty: expected a depth of {mds[0]:g}..{mds[-1]:g} m, got {md:g} m")
-        k = min(int(np.searchsorted(mds, md, side="right")) - 1, len(mds) - 2)
-        f = float((md - mds[k]) / (mds[k + 1] - mds[k]))
-        across = self._between(k) if k > 0 else np.zeros((3, 3))
-        blend = (1.0 - f) ** 2 * self.cov[k] + f**2 * self.cov[k + 1] + f * (1.0 - f) * (across + across.T)
-        return np.asarray(blend)
-
     def _propagation(self) -> Propagation:
         geometry = SurveyGeometry(self.survey, slot_allowance=self.slot_allowance)
         return Propagation(self.survey, self.legs, self.site, geometry)
-
-    def _between(self, k: int) -> Array:
-        """Covariance (3, 3) of the position of station k with that of the next."""
-        work = self._propagation()
-        across = np.zeros((3, 3))
-        for source in sources_of(self.legs):
-            work.evaluate(source)
-            if source.random:
-                before, axes = work.inner[: source.axes, : k - 1], source.axes
-                own = np.outer(work.last[:axes, k - 1], work.inner[:axes, k - 1])
-                across[:axes, :axes] += before @ before.T + own
-            else:
-                for sums in work.sums():
-                    across[: source.axes, : source.axes] += np.outer(sums[:, k - 1], sums[:, k])
-        return across
 
 
 def propagate_errors(

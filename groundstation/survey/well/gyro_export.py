@@ -24,8 +24,7 @@ YAW = re.compile(r"\bSigmaYaw\b", re.IGNORECASE)
 
 def needs_record(tool: SurveyTool) -> bool:
     """Whether a tool asks for columns of a record."""
-    text = " ".join(formula for term in tool.terms for formula in term.formulas).lower()
-    return any(name.lower() in text for name in RECORD)
+    return any(tool.asks_for(name) for name in RECORD)
 
 
 def as_gyro(tool: SurveyTool, record: SurveyRecord) -> SurveyTool:

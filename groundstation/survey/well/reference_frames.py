@@ -20,6 +20,7 @@ Array = npt.NDArray[np.float64]
 NORTHS = ("site", "true", "grid", "magnetic")
 SAME_ANGLE = math.radians(0.01)  # between a tie-on and the first station at its depth
 SAME_DEPTH = 1e-6  # m
+GRID_SCALES = (0.9, 1.1)  # beyond these it is no scale factor of a grid
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,15 +45,67 @@ class Norths:
         return angles[name]
 
 
+def turn_north(angle: float) -> Array:
+    """Matrix (3, 3) from axes of one north to those of another, whose azimuth from the first is ``angle`` (rad)."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True, slots=True)
+class SiteGrid:
+    """Coordinates of the site. They count from one north, whichever north positions are told in."""
+
+    origin: tuple[float, float, float]  # m, northing, easting and height where positions and depths are zero
+    north: str = "site"  # that the coordinates count from
+    turn: float = 0.0  # azimuth of that north from the north of positions
+    scale: float = 1.0  # metres of the grid a metre on the ground
+
+    def __post_init__(self) -> None:
+        """Refuse a scale that no grid has.
+
+        Raises
+        ------
+        SurveyError
+            Names what was expected.
+        """
+        check_grid_scale(self.scale)
+
+    def of_places(self, places: Array) -> Array:
+        """Northing, easting and height (..., 3) of positions (..., 3) north, east, down."""
+        turned = places @ turn_north(self.turn).T
+        return np.asarray(np.array(self.origin) + turned * np.array([self.scale, self.scale, -1.0]))
+
+
+def check_grid_scale(scale: float) -> None:
+    """Refuse a scale factor that no grid has.
+
+    Raises
+    ------
+    SurveyError
+        Names the range.
+    """
+    if not GRID_SCALES[0] <= scale <= GRID_SCALES[1]:
+        raise SurveyError(
+            f"grid scale factor: expected metres of the grid a metre on the ground, {GRID_SCALES[0]:g}.."
+            f"{GRID_SCALES[1]:g}, got {scale:g}"
+        )
+
+
+def north_of_coordinates(north: str) -> str:
+    """North that site coordinates count from, of positions told in ``north``: the site's own axes, or the grid."""
+    return "site" if north == "site" else "grid"
+
+
 @dataclass(frozen=True, slots=True)
 class ReferenceFrame:
-    """North and depth reference of a record and those of the answer, and the datum of heights."""
+    """North and depth reference of a record and those of the answer, the datum of heights and the site's grid."""
 
     record: str = "site"
     answer: str = "site"
     norths: Norths = field(default_factory=Norths)
     depths: DepthReference = field(default_factory=DepthReference)  # measured and true vertical ones
     height_datum: str = ""  # of site coordinates, "" where not stated
+    grid: SiteGrid | None = None  # of site coordinates, if any
 
     def to_true(self, azimuth: Array) -> Array:
         """Azimuths of the record, from true north."""
@@ -61,9 +114,7 @@ class ReferenceFrame:
     @property
     def turn(self) -> Array:
         """Matrix (3, 3) from true north, east, down to the answer's."""
-        angle = self.norths.of(self.answer)
-        c, s = math.cos(angle), math.sin(angle)
-        return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        return turn_north(self.norths.of(self.answer))
 
     def turned(self, places: Array) -> Array:
         """Positions (n, 3) from true north with the record's depths, as the answer has them."""

@@ -22,7 +22,8 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.fusion.resolve import Direction, direction_angles
-from groundstation.survey.fusion.shared import Packed, add_shared_errors, packed_of
+from groundstation.survey.fusion.shared import Packed, add_shared_errors
+from groundstation.survey.fusion.sphere_direction import tangent_errors
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
 from groundstation.survey.well.methods import OPPOSITE, Method, dogleg, leg_displacement, ratio_factor
 
@@ -227,12 +228,10 @@ class Trajectory:
         directions = [self._directions[place] for place in places]
         tangents = tangents_of(directions)
         jacobians = tangent_jacobians(tangents)
-        for place, direction, jacobian in zip(places, directions, jacobians, strict=True):
-            columns = self._columns[place] = packed_of(direction)
-            self._down[place] = (jacobian @ columns.values)[2].copy()
         rows, at = self._rows, np.array(places)
+        for place, direction, jacobian in zip(places, directions, jacobians, strict=True):
+            rows["own"][place], self._columns[place], self._down[place] = tangent_errors(direction, jacobian)
         rows["tangent"][at] = tangents
-        rows["own"][at] = jacobians @ np.array([one.cov for one in directions]) @ jacobians.transpose(0, 2, 1)
         rows["width"][at] = [direction.width for direction in directions]
         rows["count"][at] = [len(self._columns[place].places) for place in places]
 

@@ -12,10 +12,14 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class SurveyRecord:
-    """A survey as read: (n,) m, rad and rad; ``lines`` are those of the file, ``columns`` its further columns."""
+    """A survey as read: (n,) m, rad and rad; ``lines`` are those of the file, ``columns`` its further columns.
+
+    ``of_displacements`` says that it was read as lateral displacements, the form of the published field records.
+    """
 
     md: Array
     inclination: Array
     azimuth: Array
     lines: list[int]
     columns: dict[str, Array]
+    of_displacements: bool = False

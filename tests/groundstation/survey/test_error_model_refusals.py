@@ -10,13 +10,14 @@ from groundstation.errors import SurveyError, ToolError
 from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, Term, load_tool
 from groundstation.survey.well.error_propagation import propagate_errors
 from groundstation.survey.well.error_sources import Leg, WellSurvey
+from groundstation.survey.well.leg_errors import covariance_at
 
 
 @pytest.mark.parametrize("md", [-0.001, 30.001, math.nan, math.inf])
 def test_a_depth_outside_the_survey_is_refused(md: float) -> None:
     found = propagate_errors(hand_well(4), [Leg(MWD)], SITE)
     with pytest.raises(SurveyError, match=r"expected a depth of 0\.\.30 m, got"):
-        found.at(md)
+        covariance_at(found, md)
 
 
 @pytest.mark.parametrize("inclination", [0.0, 1e-40, 1e-13])

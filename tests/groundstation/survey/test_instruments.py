@@ -29,6 +29,7 @@ SHIPPED = [
     "gyro-continuous",
     "ipst-rqh",
     "mpu6500",
+    "mwd-rev4",
     "mwd-rev5.1",
     "relay",
     "rst-inclinometer",

@@ -149,7 +149,7 @@ def test_singular_weights_are_read_where_one_of_them_is_given() -> None:
 
 def exportable() -> list[str]:
     """Shipped tools whose every term the schema can say."""
-    return ["mwd-rev5.1", "rst-inclinometer"]
+    return ["mwd-rev4", "mwd-rev5.1", "rst-inclinometer"]
 
 
 @pytest.mark.parametrize("name", exportable())

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from groundstation.survey.requests.survey_answer import answer_survey
+from groundstation.survey.requests.survey_request import SurveyRequest
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.well.compiled_model import CompiledModel
 from groundstation.survey.well.error_propagation import Uncertainty, propagate_errors
@@ -120,3 +122,31 @@ def test_gyro_models_have_the_covariances_of_the_paper(cell: dict[str, str]) -> 
         printed = float(cell[name])
         agrees = abs(found - printed) <= max(2.0, 0.01 * abs(printed))
         assert agrees == (name not in missed), (name, found, printed)
+
+
+PATHS = sorted({row["well"] for row in rows_of("iscwsa_clearance_wells.csv")})
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_a_survey_lies_where_the_wells_of_the_standard_set_are_printed(tmp_path: Path, name: str) -> None:
+    """Positions there are printed to the centimetre. Balanced tangential is off by 0.1 m and more where holes bend."""
+    rows = [row for row in rows_of("iscwsa_clearance_wells.csv") if row["well"] == name and row["md"]]
+    printed = np.array([[float(row[key]) for key in ("north", "east", "tvd")] for row in rows])
+    first = float(rows[0]["md"])  # of the sidetrack 900 m, where it is vertical
+    path = tmp_path / "well.csv"
+    stations = [f"{float(r['md']) - first},{r['inclination_deg']},{r['azimuth_deg']}" for r in rows]
+    path.write_text("md_m,inclination_deg,azimuth_deg\n" + "\n".join(stations) + "\n")
+    off = {}
+    for method in (None, "balanced-tangential"):
+        found = answer_survey(SurveyRequest(path, method=method)).result
+        places = np.array([[row[key] for key in ("north_m", "east_m", "tvd_m")] for row in found["stations"]])
+        off[found["method"]] = float(np.max(np.linalg.norm(places + printed[0] - printed, axis=-1)))
+    assert off["minimum-curvature"] < 0.009
+    assert (off["balanced-tangential"] > 0.1) == (name != "09")  # well 09 is straight
+
+
+def test_lateral_displacements_keep_the_method_of_their_form(tmp_path: Path) -> None:
+    path = tmp_path / "field.csv"
+    path.write_text("md_m,a_cm,b_cm\n0,0,0\n2,1,-3\n4,2,-7\n")
+    assert answer_survey(SurveyRequest(path)).result["method"] == "balanced-tangential"
+    assert answer_survey(SurveyRequest(path, method="minimum-curvature")).result["method"] == "minimum-curvature"

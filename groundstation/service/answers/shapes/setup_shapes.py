@@ -33,7 +33,7 @@ class SetupRow:
 
 @answer_class
 class SetupAnswer:
-    """What is known of the rig: what is missing first, then what costs most at the toe, across the hole before along."""
+    """What is known of the rig: what is missing first, then what costs most at the toe, across the hole, then along."""
 
     ready: Annotated[bool, "nothing is missing"]
     missing: Annotated[list[str], "items without which the hole is not known"]

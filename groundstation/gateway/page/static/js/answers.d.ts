@@ -87,7 +87,7 @@ export interface Verdict {
   /** what it rests on, or why it is not known */
   why: string[];
   /** why it is not known, as words */
-  doubts: ("no_survey" | "stale" | "depth" | "clock" | "yaw" | "uncertain" | "setup")[];
+  doubts: ("no_survey" | "stale" | "depth" | "clock" | "yaw" | "uncertain" | "setup" | "contradiction")[];
   /** measured depth of the bit */
   bit_md_m: number | null;
   /** length of the design axis */
@@ -360,6 +360,84 @@ export interface UncertaintyAnswer {
   stations: StationRegion[];
 }
 
+/** Something that is wrong with the hole or its string. */
+export interface BlunderRow {
+  /** what explains the contradiction best */
+  kind: "bias_stepped" | "bias_creeps" | "bias_wrong" | "tilt_slipped" | "tilt_wrong" | "mount_turned" | "mount_misread" | "joint_slipped" | "joint_misread" | "encoder_slipped" | "hole_moved" | "depth_wrong_once" | "depth_wrong_from" | "axes_exchanged" | "tubes_exchanged" | "look_wrong";
+  /** what it is of, such as a tube; empty of all */
+  subject: string;
+  /** depth of the bit at the stop from which on, or at which, it is wrong */
+  from_md_m: number;
+  /** whether the second best explains nearly as much; then both are left open */
+  is_doubt: boolean;
+  /** in words, of a doubt both explanations */
+  text: string;
+  /** decimal places of the chance that an honest hole shows as much: 3 is one in a thousand */
+  evidence: number;
+  /** second best explanation */
+  second_kind: string | null;
+  /** of the second best */
+  second_evidence: number | null;
+  /** of all surveys without it, 1 is as it should be */
+  misfit_before: number;
+  /** of all surveys with it */
+  misfit_after: number;
+}
+
+/** What one source gives to the sigma at the toe. */
+export interface ToeShare {
+  /** kind of error */
+  source: string;
+  /** what it is of, such as a tube; empty of all */
+  subject: string;
+  /** standard deviation at the toe that it makes, the larger of north and east */
+  sigma_cm: number;
+}
+
+/** A tube as all surveys of the hole show it. */
+export interface AdjustedTube {
+  /** number of the tube */
+  tube: number;
+  /** of its accelerometer, the tilt of its mount in it: x, y, z */
+  bias_mg: number[];
+  /** standard deviations of it */
+  sigma_bias_mg: number[];
+  /** surveys of the tube that count */
+  looks: number;
+  /** step at its newest stop that would be found; null if nothing can tell */
+  smallest_step_mg: number | null;
+  /** what a step that is not found does at the toe at most */
+  unfound_step_cm: number | null;
+}
+
+/** Where to stop next: the turn of the string against this stop after which the toe is known best. */
+export interface NextStopAdvice {
+  /** by which to turn the string on, against where it stands at the last stop */
+  turn_deg: number;
+  /** standard deviation of the new toe after it */
+  sigma_cm: number;
+  /** the same without a turn */
+  same_face_cm: number;
+}
+
+/** One adjustment of the whole hole: how well all surveys fit, what is wrong, and what each thing costs. */
+export interface AdjustmentAnswer {
+  /** looks of tubes at stations that are in it */
+  surveys: number;
+  /** numbers beyond those that the hole and its tubes need */
+  redundancy: number;
+  /** weighted squares of what is left over what they are to be: 1 is as it should be */
+  misfit: number | null;
+  /** by which tubes lie askew in the hole from stop to stop, as the surveys show it */
+  play_deg: number | null;
+  /** standard deviation at the toe, the larger of north and east */
+  sigma_toe_cm: number | null;
+  blunders: BlunderRow[];
+  toe: ToeShare[];
+  tubes: AdjustedTube[];
+  next_stop: NextStopAdvice | null;
+}
+
 /** Design of the column. */
 export interface DesignAxis {
   /** of the axis */
@@ -554,7 +632,7 @@ export interface SetupRow {
   way: "across" | "along";
 }
 
-/** What is known of the rig: what is missing first, then what costs most at the toe, across the hole before along. */
+/** What is known of the rig: what is missing first, then what costs most at the toe, across the hole, then along. */
 export interface SetupAnswer {
   /** nothing is missing */
   ready: boolean;
@@ -580,7 +658,7 @@ export interface Alarm {
   /** how far it is */
   state: "raised" | "acknowledged" | "shelved" | "latched" | "cleared";
   /** kind: of the rig's, or deviation, projection */
-  code: "survey_untrusted" | "survey_set_aside" | "survey_unplaced" | "survey_refused" | "survey_missing" | "numbers_missing" | "numbers_lost" | "tube_counts_anew" | "tube_restarted" | "tube_silent" | "tube_sensor" | "tube_disk" | "tube_queue" | "clock" | "epoch" | "reference" | "joint" | "belt" | "depth_refused" | "depth_silent" | "depth_contradicts" | "disk" | "database" | "queue" | "bad_input" | "wrong_password" | "page_restarted" | "seal_refused" | "key_file" | "deviation" | "projection";
+  code: "survey_untrusted" | "survey_set_aside" | "survey_unplaced" | "survey_refused" | "survey_missing" | "numbers_missing" | "numbers_lost" | "tube_counts_anew" | "tube_restarted" | "tube_silent" | "tube_sensor" | "tube_disk" | "tube_queue" | "clock" | "epoch" | "reference" | "joint" | "belt" | "blunder" | "depth_refused" | "depth_silent" | "depth_contradicts" | "disk" | "database" | "queue" | "bad_input" | "wrong_password" | "page_restarted" | "seal_refused" | "key_file" | "deviation" | "projection";
   /** how much it matters */
   level: "notice" | "degraded" | "bad";
   /** what it is about */
@@ -652,7 +730,7 @@ export interface MovedStation {
 /** One alarm of the rig itself. */
 export interface RigAlarmRow {
   /** kind of alarm, see [operating](operate.md#what-the-crew-is-told) */
-  code: "survey_untrusted" | "survey_set_aside" | "survey_unplaced" | "survey_refused" | "survey_missing" | "numbers_missing" | "numbers_lost" | "tube_counts_anew" | "tube_restarted" | "tube_silent" | "tube_sensor" | "tube_disk" | "tube_queue" | "clock" | "epoch" | "reference" | "joint" | "belt" | "depth_refused" | "depth_silent" | "depth_contradicts" | "disk" | "database" | "queue" | "bad_input" | "wrong_password" | "page_restarted" | "seal_refused" | "key_file";
+  code: "survey_untrusted" | "survey_set_aside" | "survey_unplaced" | "survey_refused" | "survey_missing" | "numbers_missing" | "numbers_lost" | "tube_counts_anew" | "tube_restarted" | "tube_silent" | "tube_sensor" | "tube_disk" | "tube_queue" | "clock" | "epoch" | "reference" | "joint" | "belt" | "blunder" | "depth_refused" | "depth_silent" | "depth_contradicts" | "disk" | "database" | "queue" | "bad_input" | "wrong_password" | "page_restarted" | "seal_refused" | "key_file";
   /** how much it matters */
   level: "notice" | "degraded" | "bad";
   /** what it is about */
@@ -901,6 +979,7 @@ export interface Answers {
   events: AnswerHeader & EventsAnswer;
   static_records: AnswerHeader & StaticRecordsAnswer;
   uncertainty: AnswerHeader & UncertaintyAnswer;
+  adjustment: AnswerHeader & AdjustmentAnswer;
   column: AnswerHeader & ColumnAnswer;
   history: AnswerHeader & HistoryAnswer;
   wall: AnswerHeader & WallAnswer;

@@ -57,7 +57,7 @@ export function connectSetup(order) {
 }
 
 /** @param {SetupRow} row */
-const valueText = (row) => (row.value.length ? row.value.map(plain).join(" to ") : row.told ? "as its node was told" : "any");
+const valueText = (row) => (row.value.length ? row.value.map(plain).join(" to ") : row.told ? "of its node" : "any");
 const plain = (value) => (value !== 0 && Math.abs(value) < 1e-4 ? "0" : String(Number(value.toPrecision(4))));
 
 /** @param {SetupRow} row */

@@ -1,0 +1,106 @@
+"""A hole that was adjusted, and what that tells beside its directions; worked out when it is asked for. No I/O."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.blunder_words import say_blunder
+from groundstation.survey.adjustment.blunders import Blunder, Examination, chance_of_one
+from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, toe_budget
+from groundstation.survey.adjustment.hypotheses import BlunderKind, Hypothesis
+from groundstation.survey.adjustment.next_stop import NextStop, plan_stop
+from groundstation.survey.adjustment.reliability import Reliability, measure_reliability
+from groundstation.survey.adjustment.run_of_stops import RunOfStops
+from groundstation.survey.adjustment.toe_weights import toe_weights
+
+Array = npt.NDArray[np.float64]
+LEVEL = 2  # of north, east and down those across a hole
+OF_TUBE = (ShareSource.BIAS, ShareSource.TILT)
+LARGEST_STEP = 0.2  # m/s^2, by which an accelerometer that was knocked may step: 20 mg
+STEP = BlunderKind.BIAS_STEPPED
+
+
+@dataclass(frozen=True)  # with a dictionary, for what is worked out once
+class ExaminedHole:
+    """A hole as it was adjusted.
+
+    Parameters
+    ----------
+    examination : with what was found to be wrong
+    run : how the string was run
+    tubes : numbers of the tubes by their places
+    """
+
+    examination: Examination
+    run: RunOfStops
+    tubes: tuple[str, ...]
+
+    @property
+    def adjusted(self) -> Adjusted:
+        """The hole as it was adjusted."""
+        return self.examination.adjusted
+
+    def sentence(self, blunder: Blunder) -> str:
+        """What is wrong, in a driller's words."""
+        return say_blunder(blunder, self.run, self.tubes)
+
+    @property
+    def doubts(self) -> list[str]:
+        """Sentences of what may be one thing or another."""
+        return [self.sentence(one) for one in self.examination.blunders if one.is_doubt]
+
+    def subject(self, one: Hypothesis) -> str:
+        """What a blunder is of: a tube, the hole, the depth or the encoder."""
+        if one.kind is BlunderKind.HOLE_MOVED:
+            return "hole"
+        if one.kind in (BlunderKind.DEPTH_WRONG_ONCE, BlunderKind.DEPTH_WRONG_FROM):
+            return "depth"
+        return f"tube {self.tubes[one.subject[0]]}" if one.subject else "encoder"
+
+    @property
+    def by_subject(self) -> dict[str, list[str]]:
+        """Sentences of everything that is wrong, by what it is of."""
+        found: dict[str, list[str]] = {}
+        for one in self.examination.blunders:
+            found.setdefault(self.subject(one.best.hypothesis), []).append(self.sentence(one))
+        return found
+
+    @cached_property
+    def shares(self) -> list[ErrorShare]:
+        """Of what the variance at the toe is made."""
+        return toe_budget(self.adjusted, self.run.causes)
+
+    def share_name(self, share: ErrorShare) -> tuple[str, str]:
+        """Source of a share, and the tube or joint that it is of."""
+        if share.source is ShareSource.TURN and share.subject >= 0:
+            kind, place = self.run.causes.names[share.subject]
+            return kind, f"tube {self.tubes[place]}" if place >= 0 else ""
+        is_of_tube = share.source in OF_TUBE and share.subject >= 0
+        return share.source.value, f"tube {self.tubes[share.subject]}" if is_of_tube else ""
+
+    @cached_property
+    def next_stop(self) -> NextStop | None:
+        """What the angle of the next stop is worth; None before two stations, from which the length is taken."""
+        md = self.adjusted.path.md
+        return plan_stop(self.adjusted, float(md[-1] - md[-2])) if len(md) > LEVEL else None
+
+    @cached_property
+    def steps_found(self) -> list[Reliability]:
+        """How well a step of each accelerometer at its newest stop would be found."""
+        looks = self.adjusted.looks
+        newest = {int(tube): int(stop) for tube, stop in zip(looks.tube, looks.stop, strict=True)}
+        steps = [Hypothesis(STEP, (tube,), stop) for tube, stop in newest.items()]
+        chance = chance_of_one(looks, self.run)
+        return measure_reliability(
+            self.adjusted, self.run, steps, toe_weights(self.adjusted), {STEP: LARGEST_STEP}, chance
+        )
+
+
+def std_across(variances: Array) -> float:
+    """Standard deviation (m) across a hole from variances (3,) to north, east and down: the larger of the level two."""
+    return float(np.sqrt(max(variances[:LEVEL].max(), 0.0)))

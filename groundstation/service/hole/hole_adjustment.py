@@ -1,0 +1,178 @@
+"""The adjustment of the hole that is being drilled, from its resolved stops. No I/O.
+
+What it comes to depends on the stops alone and not on the order in which they came or on when it was asked for: the
+same hole comes out of a rig of processes, of one process and of a restart, bit for bit. An adjustment of many looks
+therefore begins where one of all looks up to an earlier stop of the string ends, always the same one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.config import GroundConfig
+from groundstation.service.hole.examined_hole import ExaminedHole
+from groundstation.service.hole.history import SAME_STOP
+from groundstation.service.hole.resolved_stops import ResolvedStops, Rows
+from groundstation.service.hole.string_prior import Hanging, causes_of_turns, prior_of_string
+from groundstation.survey.adjustment.adjust import adjust_hole
+from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.blunders import examine_hole
+from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks, PathPrior, StartingPoint, StringPrior
+from groundstation.survey.adjustment.run_of_stops import RunOfStops
+from groundstation.survey.fusion.resolve import Direction
+from groundstation.survey.fusion.shared import Packed, SharedErrors
+from groundstation.survey.fusion.sphere_direction import SphereDirection, tangent_errors
+from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR, Trust
+from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
+
+Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
+MANY = 1500  # looks, from which on an adjustment begins where an earlier one ended
+STOPS_KEPT = 16  # stops of the string between such beginnings
+OWN_SHARE = 0.2  # of a tube's noise that is taken from the stop itself: the variance of 32 readings is not exact
+LOUD = 2.5  # times a tube's noise, from which on a stop is one at which it was shaken
+
+
+@dataclass(frozen=True, slots=True)
+class LookedAt:
+    """Looks in the order of time, what is known of their tubes before, and how the string was run."""
+
+    looks: Looks
+    string: StringPrior
+    run: RunOfStops
+    tubes: tuple[str, ...]  # numbers of the tubes by their places
+
+
+class HoleAdjustment:
+    """Adjusts a hole whenever something has come to it.
+
+    Parameters
+    ----------
+    config : of the ground station
+    shared : whose columns the directions get
+    """
+
+    def __init__(self, config: GroundConfig, shared: SharedErrors) -> None:
+        self._config, self._shared = config, shared
+        self._kept: tuple[bytes, StartingPoint] | None = None  # where an earlier adjustment ended, and of what looks
+
+    def examine(
+        self, stops: ResolvedStops, station_of_row: Places, mds: Array, collar: Direction
+    ) -> ExaminedHole | None:
+        """Adjust the hole and say what is wrong with it; None where no look counts.
+
+        Parameters
+        ----------
+        stops : all of them
+        station_of_row : (n,), place of the station of each in the order of depth, from 1; 0 at the collar
+        mds : (s,) m, of the stations below the collar
+        collar : direction there, as it is known before
+        """
+        table = stops.rows[: len(stops)]
+        below = np.flatnonzero(station_of_row > 0)
+        rows = below[np.lexsort((table["tube"][below], table["at"][below]))]
+        if not len(rows):
+            return None
+        path = self.path_of(mds, collar)
+        seen = self._looked_at(table[rows], station_of_row[rows], path.md)
+        start = self._start(table[rows], seen, path)
+        return ExaminedHole(examine_hole(seen.looks, seen.string, path, seen.run, start=start), seen.run, seen.tubes)
+
+    def _looked_at(self, seen: Rows, station: Places, station_md: Array) -> LookedAt:
+        """Looks of rows of the table in the order of time, at their stations (m)."""
+        numbers, which = number_values(seen["chain"])
+        chains, hanging = [self._shared.chain(number) for number in numbers], Hanging()
+        hung = np.array([hanging.add_chain(chain) for chain in chains], np.intp)[which]
+        newest = dict(zip(which.tolist(), seen["systematic_var"].tolist(), strict=True))
+        variances = [newest[place] for place in range(len(chains))]
+        causes = causes_of_turns(hanging, chains, variances, math.radians(self._config.mount_std_deg) ** 2)
+        tube_of, make_up = np.ascontiguousarray(hung[:, 0]), np.ascontiguousarray(hung[:, 1])
+        unknown = UNKNOWN_YAW_VAR * (seen["trust"] == Trust.UNKNOWN_YAW)
+        stop, force = stop_numbers(seen["at"]), np.ascontiguousarray(seen["force"])
+        noise, yaw = noise_of(seen, tube_of), seen["yaw"].copy()
+        looks = Looks(station, tube_of, make_up, stop, force, noise, yaw, seen["yaw_var"] + unknown)
+        first = np.searchsorted(stop, np.arange(stop[-1] + 1))
+        deepest = np.maximum.reduceat(station_md[station], first)
+        run = RunOfStops(deepest, seen["at"][first], station_md, causes)
+        string = prior_of_string(self._config, len(hanging.tubes), causes)
+        return LookedAt(looks, string, run, tuple(str(tube) for _, tube in hanging.tubes))
+
+    def path_of(self, mds: Array, collar: Direction) -> PathPrior:
+        """What is known of the path before."""
+        tangents = tangents_of([collar])
+        cov, _, _ = tangent_errors(collar, tangent_jacobians(tangents)[0])
+        return PathPrior(
+            np.concatenate([[0.0], mds]),
+            tangents[0],
+            cov,
+            math.radians(self._config.curvature_std_deg_per_m),
+            self._config.curvature_length,
+        )
+
+    def _start(self, rows: Rows, seen: LookedAt, path: PathPrior) -> StartingPoint | None:
+        """Where the adjustment of many looks begins; None for that of a few, which begins with the looks alone."""
+        looks = seen.looks
+        if len(looks) < MANY:
+            return None
+        earlier = np.flatnonzero(looks.stop < int(looks.stop[-1]) // STOPS_KEPT * STOPS_KEPT)
+        used, station = np.unique(looks.station[earlier], return_inverse=True)
+        above = replace(path, md=path.md[np.concatenate([[0], used])])
+        made_of = rows[earlier].tobytes() + above.md.tobytes()
+        if self._kept is None or self._kept[0] != made_of:
+            part = self._looked_at(rows[earlier], station.astype(np.intp) + 1, above.md)
+            self._kept = made_of, adjust_hole(part.looks, part.string, above).now
+        return grown_start(self._kept[1], used, len(path.md), seen.string)
+
+
+def grown_start(start: StartingPoint, used: Places, count: int, string: StringPrior) -> StartingPoint:
+    """Where to begin with more stations and tubes: new stations go on as those above, new tubes as they are known.
+
+    Parameters
+    ----------
+    used : places of the stations that were adjusted among ``count``, the collar included
+    """
+    tubes = np.zeros((string.count, OF_TUBE))
+    tubes[:, TURN], make_ups = string.turn[: string.count], string.turn[string.count :].copy()
+    tubes[: len(start.tubes)], make_ups[: len(start.make_ups)] = start.tubes, start.make_ups
+    known = np.concatenate([[0], used])
+    nearest = np.searchsorted(known, np.arange(count), side="right") - 1
+    curvatures = np.zeros((count, 2))
+    curvatures[known] = start.curvatures
+    return replace(start, tangents=start.tangents[nearest], curvatures=curvatures, tubes=tubes, make_ups=make_ups)
+
+
+def number_values(values: npt.NDArray[np.uint32]) -> tuple[list[int], Places]:
+    """Different values in the order of their coming, and the place (n,) of each among them."""
+    different = dict.fromkeys(values.tolist())
+    place = {value: number for number, value in enumerate(different)}
+    return list(different), np.array([place[value] for value in values.tolist()], np.intp)
+
+
+def stop_numbers(at: Array) -> Places:
+    """Numbers (n,) of the stops of the string to which times (n,), s, in their order belong."""
+    return np.concatenate([[0], np.cumsum(np.diff(at) >= SAME_STOP)]).astype(np.intp)[: len(at)]
+
+
+def noise_of(seen: Rows, tube_of: Places) -> Array:
+    """Variances (n,), (m/s^2)^2, of the mean forces on one axis: mostly those that the tube has at all its stops."""
+    own = seen["force_var"]
+    counts = np.bincount(tube_of)
+    usual = (np.bincount(tube_of, own) / np.maximum(counts, 1))[tube_of]
+    return np.where(own > LOUD * usual, own, OWN_SHARE * own + (1.0 - OWN_SHARE) * usual)
+
+
+def directions_of(adjusted: Adjusted, shared: SharedErrors) -> list[SphereDirection]:
+    """Directions of the stations below the collar, from the top down."""
+    bases = adjusted.bases[1:]
+    own = np.swapaxes(bases, 1, 2) @ adjusted.own_covs[1:, :2, :2] @ bases
+    columns = np.swapaxes(bases, 1, 2) @ adjusted.columns[1:, :2]
+    places = shared.adjusted_places(columns.shape[2])
+    width = shared.count
+    found = []
+    for tangent, cov, values in zip(adjusted.now.tangents[1:], own, columns, strict=True):
+        found.append(SphereDirection(tangent, cov, Packed.of_values(values, places, width)))
+    return found

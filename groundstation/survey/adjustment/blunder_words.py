@@ -1,0 +1,92 @@
+"""A blunder in a driller's words: what, how large with its +-, from where on, and what else it may be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.adjustment.blunders import Blunder, Explanation
+from groundstation.survey.adjustment.hypotheses import BY_DEPTH, OF_FORCE, BlunderKind
+from groundstation.survey.adjustment.run_of_stops import RunOfStops
+
+Array = npt.NDArray[np.float64]
+STANDARD_GRAVITY = 9.80665
+HOUR = 3600.0
+K = BlunderKind
+SENTENCES: Mapping[BlunderKind, str] = {
+    K.BIAS_STEPPED: "accelerometer of tube {tube} steps by {size} from the stop at {depth} on",
+    K.BIAS_CREEPS: "accelerometer of tube {tube} creeps by {size} since the stop at {depth}",
+    K.BIAS_WRONG: "accelerometer of tube {tube} is off by {size}, more than was told of it",
+    K.TILT_SLIPPED: "mount of tube {tube} tilted by {size} from the stop at {depth} on",
+    K.TILT_WRONG: "mount of tube {tube} is tilted by {size}, more than was told of it",
+    K.MOUNT_TURNED: "mount of tube {tube} turned by {size} from the stop at {depth} on",
+    K.MOUNT_MISREAD: "turn of the mount of tube {tube} is off by {size}, more than was told of it",
+    K.JOINT_SLIPPED: "joint above tube {tube} slipped by {size} from the stop at {depth} on",
+    K.JOINT_MISREAD: "angle of the joint above tube {tube} is off by {size}, more than was told of it",
+    K.ENCODER_SLIPPED: "encoder slipped by {size} from the stop at {depth} on",
+    K.HOLE_MOVED: "hole moved by {size} between {first} and {last} before the stop at {depth}",
+    K.DEPTH_WRONG_ONCE: "depth at the stop at {depth} is off by {size}",
+    K.DEPTH_WRONG_FROM: "depth is off by {size} from the stop at {depth} on",
+    K.AXES_EXCHANGED: "x and y of tube {tube} are exchanged from the stop at {depth} on",
+    K.TUBES_EXCHANGED: "tubes {tube} and {other} are exchanged",
+    K.LOOK_WRONG: "reading of tube {tube} at the stop at {depth} is off by {size}",
+}
+
+
+def say_blunder(blunder: Blunder, run: RunOfStops, tubes: Sequence[str]) -> str:
+    """A blunder as a sentence; of a doubt both explanations.
+
+    Parameters
+    ----------
+    run : gives the depth of stops and stations
+    tubes : names of tubes by their places
+    """
+    best = say_explanation(blunder.best, run, tubes)
+    if blunder.second is None or not blunder.is_doubt:
+        return best
+    return f"{best}, or {say_explanation(blunder.second, run, tubes)}: the readings do not tell which"
+
+
+def say_explanation(one: Explanation, run: RunOfStops, tubes: Sequence[str]) -> str:
+    """One explanation as a sentence."""
+    kind, subject = one.hypothesis.kind, one.hypothesis.subject
+    words = {"size": say_size(one), "depth": f"{run.md[one.hypothesis.stop]:.1f} m"}
+    if kind is K.HOLE_MOVED:
+        words |= {"first": f"{run.station_md[subject[0]]:.1f} m", "last": f"{run.station_md[subject[1]]:.1f} m"}
+    elif subject:
+        words |= {"tube": tubes[subject[0]], "other": tubes[subject[-1]]}
+    return SENTENCES[kind].format(**words)
+
+
+def say_size(one: Explanation) -> str:
+    """Size of a blunder with its standard deviation and unit, such as "17.0 ± 0.2 mg"; nothing where it is known."""
+    if not len(one.size):
+        return ""
+    size, std = length_of(one.size, one.cov)
+    unit, factor = unit_of(one.hypothesis.kind)
+    size, std = size * factor, std * factor
+    digits = min(6, max(0, 1 - math.floor(math.log10(std)))) if std > 0.0 else 3
+    return f"{size:.{digits}f} ± {std:.{digits}f} {unit}"
+
+
+def unit_of(kind: BlunderKind) -> tuple[str, float]:
+    """Unit that a blunder is told in, and how many of it are one of SI."""
+    if kind is K.BIAS_CREEPS:
+        return "mg an hour", HOUR * 1e3 / STANDARD_GRAVITY
+    if kind in OF_FORCE:
+        return "mg", 1e3 / STANDARD_GRAVITY
+    if kind in BY_DEPTH:
+        return "m", 1.0
+    return "deg", 180.0 / math.pi
+
+
+def length_of(size: Array, cov: Array) -> tuple[float, float]:
+    """Length of a blunder and its standard deviation along it; of one number, with its sign."""
+    if len(size) == 1:
+        return float(size[0]), math.sqrt(float(cov[0, 0]))
+    length = float(np.linalg.norm(size))
+    along = size / length if length > 0.0 else np.eye(len(size))[0]
+    return length, math.sqrt(float(along @ cov @ along))

@@ -1,0 +1,233 @@
+"""What is wrong with a hole that does not fit: the best single explanation, beside the second best, one after another.
+
+Every hypothesis is scored at once; the best of each kind are tried by adjusting the hole with them, and compared by
+their likelihood. One is believed where fewer than one in a thousand honest holes would ever show as much, however many
+hypotheses and stops there are; where the second best explains nearly as much, it is a doubt and both are taken in.
+Source: Baarda 1968; Teunissen 1990; Pope, NOAA Technical Report NOS 65 (1976), for a variance that is estimated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, Hypothesis, all_hypotheses
+from groundstation.survey.adjustment.looks import Looks, PathPrior, StartingPoint, StringPrior
+from groundstation.survey.adjustment.run_of_stops import RunOfStops
+from groundstation.survey.adjustment.scores import Score, log_chances, log_tail, score_hypotheses
+from groundstation.survey.adjustment.screen import is_suspicious
+from groundstation.survey.adjustment.taken_in import TakenIn, adjust_with, deviance_of
+
+Array = npt.NDArray[np.float64]
+FALSE_ALARM = 1e-3  # of a whole honest hole
+WORTH_TRYING = math.log(1e-3)  # of one hypothesis, before it is tried
+MOST_TRIED = 8
+AS_GOOD = 0.3  # part of the best's logarithm that is worth trying; play hides the rest
+PARTED = math.log(100.0)  # by how much the best outdoes the second, or it is a doubt
+MOST_BLUNDERS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """One explanation of what does not fit.
+
+    Parameters
+    ----------
+    hypothesis : what it is
+    size, cov : (q,) and (q, q), m/s^2 (a second, of a creep), rad or m; empty where the size is known
+    log_chance : natural logarithm of the chance that an honest hole shows as much, all hypotheses and stops counted
+    """
+
+    hypothesis: Hypothesis
+    size: Array
+    cov: Array
+    log_chance: float
+
+
+@dataclass(frozen=True, slots=True)
+class Blunder:
+    """A blunder that was found.
+
+    Parameters
+    ----------
+    best, second : explanations; there may be no second
+    before, after : weighted squares of what is left over what they are to be, without and with it
+    """
+
+    best: Explanation
+    second: Explanation | None
+    before: float
+    after: float
+
+    @property
+    def is_doubt(self) -> bool:
+        """Whether the second best explains nearly as much."""
+        return self.second is not None and self.second.log_chance - self.best.log_chance < PARTED
+
+    @property
+    def taken_in(self) -> tuple[Hypothesis, ...]:
+        """What the adjustment leaves open for it: both explanations of a doubt, where neither has a known size."""
+        both = (self.best, self.second) if self.second and self.is_doubt else (self.best,)
+        if any(one.hypothesis.kind in KNOWN_SIZE for one in both):
+            both = (self.best,)
+        return tuple(one.hypothesis for one in both)
+
+
+@dataclass(frozen=True, slots=True)
+class Examination:
+    """A hole adjusted with all blunders that were found, those known before first."""
+
+    adjusted: Adjusted
+    blunders: tuple[Blunder, ...] = ()
+
+    @property
+    def global_ratio(self) -> float:
+        """Weighted squares of what is left over what they are to be: 1 in an honest hole."""
+        return global_ratio(self.adjusted)
+
+
+def global_ratio(found: Adjusted) -> float:
+    """Weighted squares of what the looks leave over what they are to be."""
+    return found.squares / max(found.redundancy, 1e-9)
+
+
+def examine_hole(
+    looks: Looks,
+    string: StringPrior,
+    path: PathPrior,
+    run: RunOfStops,
+    known: Sequence[Blunder] = (),
+    start: StartingPoint | None = None,
+) -> Examination:
+    """Adjust a hole and say what is wrong with it.
+
+    Parameters
+    ----------
+    looks, string, path, start : as of ``adjust_hole``
+    run : stops and causes of turns
+    known : blunders that were found before, which are taken in; a doubt among them is judged again
+    """
+    known = tuple(_judged_again(looks, string, path, run, known, place) for place in range(len(known)))
+    now = adjust_with(looks, string, path, run, _taken_in(known), start)
+    found = list(known)
+    while len(found) < MOST_BLUNDERS and is_suspicious(now.found, run):
+        blunder = find_blunder(looks, string, path, run, now, _taken_in(found))
+        if blunder is None:
+            break
+        found.append(blunder)
+        now = adjust_with(looks, string, path, run, _taken_in(found), now.found.now)
+    return Examination(now.found, tuple(_resized(one, now, _taken_in(found)) for one in found))
+
+
+def _resized(blunder: Blunder, now: TakenIn, taken_in: tuple[Hypothesis, ...]) -> Blunder:
+    """A blunder with its size as all looks and the other blunders have it now; a doubt keeps those of its trials."""
+    if blunder.is_doubt:
+        return blunder
+    place = taken_in.index(blunder.best.hypothesis)
+    return replace(blunder, best=replace(blunder.best, size=now.sizes[place], cov=now.covs[place]))
+
+
+def _taken_in(blunders: Sequence[Blunder]) -> tuple[Hypothesis, ...]:
+    return tuple(dict.fromkeys(one for blunder in blunders for one in blunder.taken_in))
+
+
+def find_blunder(
+    looks: Looks,
+    string: StringPrior,
+    path: PathPrior,
+    run: RunOfStops,
+    now: TakenIn,
+    known: tuple[Hypothesis, ...] = (),
+) -> Blunder | None:
+    """Find the best explanation of what an adjustment leaves; none where an honest hole may well show as much.
+
+    Parameters
+    ----------
+    looks, string, path, run : of the hole
+    now : its adjustment, with the hypotheses ``known`` taken in
+    """
+    found = now.found
+    hypotheses = [one for one in all_hypotheses(looks, run) if one not in known]
+    worth = best_of_kinds(score_hypotheses(found, run, hypotheses), found)
+    if not worth:
+        return None
+    many = math.log(len(hypotheses)) + log_of_stops(looks)
+    adjusted = [_tried(looks, string, path, run, found, known, one) for one in worth]
+    tried = [(with_one, _explained(with_one, found, one, many)) for with_one, one in zip(adjusted, worth, strict=True)]
+    tried.sort(key=lambda pair: pair[1].log_chance)
+    with_best, best = tried[0]
+    if best.log_chance > math.log(FALSE_ALARM):
+        return None
+    second = tried[1][1] if len(tried) > 1 else None
+    return Blunder(best, second, global_ratio(found), global_ratio(with_best.found))
+
+
+def chance_of_one(looks: Looks, run: RunOfStops) -> float:
+    """Chance of a false alarm that one hypothesis has at the last stop, so that a whole hole keeps its own."""
+    return FALSE_ALARM * math.exp(-log_of_stops(looks)) / max(1, sum(1 for _ in all_hypotheses(looks, run)))
+
+
+def log_of_stops(looks: Looks) -> float:
+    """Logarithm of k (k + 1), the part of all false alarms that is spent at the stop k: in sum over all stops, one."""
+    count = max(1, len(np.unique(looks.stop)))
+    return math.log(count * (count + 1.0))
+
+
+def best_of_kinds(scores: Sequence[Score], found: Adjusted) -> list[Hypothesis]:
+    """The hypotheses that are worth trying: of each kind and subject the best, of them the best few."""
+    best: dict[tuple[object, ...], tuple[float, Hypothesis]] = {}
+    for score in scores:
+        chances = log_chances(score.squares, score.told, found.squares, found.redundancy)
+        for place in np.flatnonzero(chances < WORTH_TRYING).tolist():
+            one = score.hypotheses[place]
+            about = (one.kind, one.subject)
+            best[about] = min(best.get(about, (0.0, one)), (float(chances[place]), one), key=lambda pair: pair[0])
+    ranked = sorted(best.values(), key=lambda pair: pair[0])
+    ordered = [one for chance, one in ranked if chance <= AS_GOOD * ranked[0][0]]
+    first_of_kind = {one.kind: one for one in reversed(ordered)}
+    leading = [one for one in ordered if one is first_of_kind[one.kind] or one in ordered[:3]]
+    return leading[:MOST_TRIED]
+
+
+def _tried(
+    looks: Looks,
+    string: StringPrior,
+    path: PathPrior,
+    run: RunOfStops,
+    found: Adjusted,
+    known: tuple[Hypothesis, ...],
+    one: Hypothesis,
+) -> TakenIn:
+    return adjust_with(looks, string, path, run, (*known, one), found.now)
+
+
+def _explained(with_one: TakenIn, found: Adjusted, one: Hypothesis, many: float) -> Explanation:
+    """What a hypothesis explains, from the likelihood of the looks without and with it."""
+    gain = max(0.0, deviance_of(found) - deviance_of(with_one.found))
+    free = max(1.0, with_one.found.redundancy)
+    squares = math.expm1(min(gain / free, 500.0)) * free
+    told = np.array([WIDTHS[one.kind]])
+    chance = float(log_tail(np.array([squares]), told, np.array([free]))[0]) + many
+    return Explanation(one, with_one.sizes[-1], with_one.covs[-1], min(0.0, chance))
+
+
+def _judged_again(
+    looks: Looks, string: StringPrior, path: PathPrior, run: RunOfStops, known: Sequence[Blunder], place: int
+) -> Blunder:
+    """A blunder that was a doubt, by what later looks tell of it."""
+    blunder = known[place]
+    if not blunder.is_doubt or blunder.second is None:
+        return blunder
+    others = _taken_in([one for k, one in enumerate(known) if k != place])
+    plain = adjust_with(looks, string, path, run, others).found
+    tried = [
+        _explained(_tried(looks, string, path, run, plain, others, one.hypothesis), plain, one.hypothesis, 0.0)
+        for one in (blunder.best, blunder.second)
+    ]
+    tried.sort(key=lambda one: one.log_chance)
+    return Blunder(tried[0], tried[1], blunder.before, blunder.after)

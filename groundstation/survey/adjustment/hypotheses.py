@@ -1,0 +1,235 @@
+"""What may be wrong beside what was foreseen: kinds of blunder, and every single one that the looks could show.
+
+A hypothesis changes the force of a look by its amplitude there times the columns of its kind: a step of a bias counts
+one in every look of its tube from a stop on, a creep what has passed since. Source: Baarda, "A testing procedure for
+use in geodetic networks", Netherlands Geodetic Commission 2 (1968).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum, auto
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.adjustment.adjusted import Linearised
+from groundstation.survey.adjustment.looks import Looks, StartingPoint
+from groundstation.survey.adjustment.run_of_stops import JOINT, RunOfStops
+
+Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
+SHORT = 0.05  # m, over which a hole has one curvature
+FEWEST_TO_CREEP = 2  # looks after the last right one; with one it is a step
+MOST_MOVED = 4  # neighbouring stations that move together
+RECENT, EARLIER = 16, 8  # stops from which on, where there are more than both
+
+
+class BlunderKind(StrEnum):
+    """What may be wrong."""
+
+    BIAS_STEPPED = auto()
+    BIAS_CREEPS = auto()
+    BIAS_WRONG = auto()
+    TILT_SLIPPED = auto()
+    TILT_WRONG = auto()
+    MOUNT_TURNED = auto()
+    MOUNT_MISREAD = auto()
+    JOINT_SLIPPED = auto()
+    JOINT_MISREAD = auto()
+    ENCODER_SLIPPED = auto()
+    HOLE_MOVED = auto()
+    DEPTH_WRONG_ONCE = auto()
+    DEPTH_WRONG_FROM = auto()
+    AXES_EXCHANGED = auto()
+    TUBES_EXCHANGED = auto()
+    LOOK_WRONG = auto()
+
+
+K = BlunderKind
+SWAPPED = [1, 0, 2]
+OF_FORCE = (K.BIAS_STEPPED, K.BIAS_CREEPS, K.BIAS_WRONG, K.LOOK_WRONG)
+CONSTANT = (K.BIAS_WRONG, K.TILT_WRONG, K.MOUNT_MISREAD, K.JOINT_MISREAD)
+KNOWN_SIZE = (K.AXES_EXCHANGED, K.TUBES_EXCHANGED)  # of amplitude one, put right in the looks themselves
+BY_TILT = (K.TILT_SLIPPED, K.TILT_WRONG)
+BY_DEPTH = (K.DEPTH_WRONG_ONCE, K.DEPTH_WRONG_FROM)
+OF_CHAIN = (K.JOINT_SLIPPED, K.JOINT_MISREAD, K.ENCODER_SLIPPED)
+BY_TURN = (K.MOUNT_TURNED, K.MOUNT_MISREAD, *OF_CHAIN)
+WIDTHS = {
+    **dict.fromkeys(OF_FORCE, 3),
+    **dict.fromkeys((*BY_TILT, K.HOLE_MOVED), 2),
+    **dict.fromkeys((*BY_TURN, *BY_DEPTH, *KNOWN_SIZE), 1),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """One thing that may be wrong.
+
+    Parameters
+    ----------
+    kind : of it
+    subject : the tube, the tube below the joint, both tubes, first and last station of those that moved, or none
+    stop : from which on, or at which alone; 0 for what was wrong from the beginning
+    """
+
+    kind: BlunderKind
+    subject: tuple[int, ...]
+    stop: int = 0
+
+
+def effect_of(
+    one: Hypothesis, looks: Looks, run: RunOfStops, now: StartingPoint, linear: Linearised, reach: float = 0.0
+) -> tuple[Places, Array]:
+    """Looks (r,) that a hypothesis changes, and the change (r, 3, q) of their force for one unit of it.
+
+    Units are m/s^2 (a second, of a creep), rad, m, or one for what has a known size. Of a depth that is wrong by about
+    ``reach`` (m) it is the mean change over that length.
+    """
+    amplitude = effect_amplitudes(one, looks, run)
+    rows = np.flatnonzero(amplitude)
+    by = linear.jacobians[rows]
+    if one.kind in OF_FORCE:
+        columns = np.broadcast_to(np.eye(3), (len(rows), 3, 3))
+    elif one.kind in BY_TILT:
+        columns = by[:, :, 5:7]
+    elif one.kind in BY_TURN:
+        columns = by[:, :, 7:8]
+    elif one.kind is K.HOLE_MOVED:
+        columns = by[:, :, :2]
+    elif one.kind is K.AXES_EXCHANGED:
+        columns = (looks.force[rows] - looks.force[rows][:, SWAPPED])[:, :, None]
+    elif one.kind is K.TUBES_EXCHANGED:
+        columns = np.einsum("kab,kb->ka", by[:, :, :2], _apart(one, looks, now, linear, rows))[:, :, None]
+    else:
+        bent = _bent_by_metre(run.station_md, now, linear, reach)[looks.station[rows]]
+        columns = np.einsum("kab,kb->ka", by[:, :, :2], bent)[:, :, None]
+    return rows, np.asarray(columns * amplitude[rows, None, None])
+
+
+def _bent_by_metre(md: Array, now: StartingPoint, linear: Linearised, reach: float) -> Array:
+    """How the hole bends (s + 1, 2) from each station on, rad/m, in the mean over ``reach`` m, which may be upward."""
+    if abs(reach) < SHORT:
+        return now.curvatures
+    there = np.stack([np.interp(md + reach, md, one) for one in now.tangents.T], axis=1)
+    bent = np.einsum("sai,si->sa", linear.bases, there - now.tangents) / reach
+    beyond = np.clip(md + reach - md[-1], 0.0, abs(reach))[:, None] / abs(reach)
+    return np.asarray(bent + beyond * now.curvatures[-1])
+
+
+def _apart(one: Hypothesis, looks: Looks, now: StartingPoint, linear: Linearised, rows: Places) -> Array:
+    """How far (r, 2), rad, the hole points elsewhere where the other of two tubes looked."""
+    station = looks.station[rows]
+    apart = now.tangents[exchanged_stations(looks, one.subject)[rows]] - now.tangents[station]
+    return np.asarray(np.einsum("kai,ki->ka", linear.bases[station], apart))
+
+
+def exchanged_stations(looks: Looks, tubes: tuple[int, ...]) -> Places:
+    """Stations (n,) of all looks were two tubes to change places at every stop that both looked at."""
+    one, other = (np.flatnonzero(looks.tube == tube) for tube in tubes)
+    both, of_one, of_other = np.intersect1d(looks.stop[one], looks.stop[other], return_indices=True)
+    found = looks.station.copy()
+    found[one[of_one]], found[other[of_other]] = looks.station[other[of_other]], looks.station[one[of_one]]
+    return found if len(both) else looks.station
+
+
+def effect_amplitudes(one: Hypothesis, looks: Looks, run: RunOfStops) -> Array:
+    """How much (n,) of a hypothesis is in each look; 0 in those that it leaves alone.
+
+    Where the hole moved it is the looks before that are off, so that the directions are those of the hole as it is.
+    """
+    amount: Array | float = -1.0 if one.kind is K.HOLE_MOVED else 1.0
+    if one.kind in OF_CHAIN:
+        amount = _turned_by(one, looks, run)
+    elif one.kind is K.BIAS_CREEPS:
+        amount = run.time[looks.stop] - run.time[one.stop]
+    return np.where(_is_touched(one, looks), amount, 0.0)
+
+
+def _is_touched(one: Hypothesis, looks: Looks) -> npt.NDArray[np.bool_]:
+    """Which looks (n,) a hypothesis may change."""
+    since = looks.stop >= one.stop
+    if one.kind is K.TUBES_EXCHANGED:
+        return np.asarray(exchanged_stations(looks, one.subject) != looks.station)
+    if one.kind is K.HOLE_MOVED:
+        return np.asarray(~since & (looks.station >= one.subject[0]) & (looks.station <= one.subject[1]))
+    if one.kind in (K.DEPTH_WRONG_ONCE, K.LOOK_WRONG):
+        since = looks.stop == one.stop
+    if one.kind in (*OF_CHAIN, *BY_DEPTH):
+        return since
+    return np.asarray(since & (looks.tube == one.subject[0]))
+
+
+def _turned_by(one: Hypothesis, looks: Looks, run: RunOfStops) -> Array:
+    """Turn (n,) of the yaw of every look for one radian of a joint or of the encoder."""
+    if one.kind is K.ENCODER_SLIPPED:
+        return np.ones(len(looks))
+    return np.asarray(run.causes.turned_looks(looks)[run.causes.names.index((JOINT, one.subject[0]))])
+
+
+def all_hypotheses(looks: Looks, run: RunOfStops) -> Iterator[Hypothesis]:
+    """Everything single that the looks of a hole could show; from the latest stops on where there are many."""
+    stops = np.unique(looks.stop).tolist()
+    onsets = set(thinned_stops(stops))
+    yield from _of_string(stops, onsets)
+    of_tubes = {tube: np.unique(looks.stop[looks.tube == tube]).tolist() for tube in np.unique(looks.tube).tolist()}
+    for tube, own in of_tubes.items():
+        yield from _of_tube(tube, own, onsets)
+    yield from _of_joints(looks, run, onsets)
+    for one, other in itertools.combinations(of_tubes, 2):
+        if np.intersect1d(of_tubes[one], of_tubes[other]).size:
+            yield Hypothesis(K.TUBES_EXCHANGED, (one, other))
+    yield from _of_hole(looks, onsets)
+
+
+def thinned_stops(stops: list[int]) -> list[int]:
+    """The latest stops, and some of those before."""
+    before = stops[:-RECENT]
+    every = max(1, -(-len(before) // EARLIER))
+    return [*before[::every], *stops[-RECENT:]]
+
+
+def _of_string(stops: list[int], onsets: set[int]) -> Iterator[Hypothesis]:
+    for stop in stops[1:]:
+        if stop in onsets:
+            yield Hypothesis(K.ENCODER_SLIPPED, (), stop)
+            yield Hypothesis(K.DEPTH_WRONG_ONCE, (), stop)
+            yield Hypothesis(K.DEPTH_WRONG_FROM, (), stop)
+
+
+def _of_tube(tube: int, own: list[int], onsets: set[int]) -> Iterator[Hypothesis]:
+    for kind in (K.BIAS_WRONG, K.TILT_WRONG, K.MOUNT_MISREAD):
+        yield Hypothesis(kind, (tube,))
+    for place, stop in enumerate(own):
+        if stop not in onsets:
+            continue
+        yield Hypothesis(K.LOOK_WRONG, (tube,), stop)
+        yield Hypothesis(K.AXES_EXCHANGED, (tube,), stop)
+        if place:
+            for kind in (K.BIAS_STEPPED, K.TILT_SLIPPED, K.MOUNT_TURNED):
+                yield Hypothesis(kind, (tube,), stop)
+        if place < len(own) - FEWEST_TO_CREEP:
+            yield Hypothesis(K.BIAS_CREEPS, (tube,), stop)
+
+
+def _of_joints(looks: Looks, run: RunOfStops, onsets: set[int]) -> Iterator[Hypothesis]:
+    """A joint may be misread from when it is made on, and slip at any stop after that."""
+    for (kind, tube), turned in zip(run.causes.names, run.causes.turned_looks(looks), strict=True):
+        stops = np.unique(looks.stop[turned != 0.0]).tolist()
+        if kind == JOINT and stops:
+            yield Hypothesis(K.JOINT_MISREAD, (tube,))
+            yield from (Hypothesis(K.JOINT_SLIPPED, (tube,), stop) for stop in stops[1:] if stop in onsets)
+
+
+def _of_hole(looks: Looks, onsets: set[int]) -> Iterator[Hypothesis]:
+    """Neighbouring stations that moved together: those with looks of at least two tubes from a stop on."""
+    last = int(looks.station.max(initial=0))
+    for stop in sorted(onsets):
+        since = looks.stop >= stop
+        before = np.bincount(looks.station[~since], minlength=last + 1) > 0
+        seen = np.flatnonzero((np.bincount(looks.station[since], minlength=last + 1) > 0) & before).tolist()
+        for first, width in itertools.product(seen, range(2, MOST_MOVED + 1)):
+            if set(range(first, first + width)) <= set(seen):
+                yield Hypothesis(K.HOLE_MOVED, (first, first + width - 1), stop)

@@ -1,0 +1,85 @@
+"""What blame, reliability and budget ask of a string beside its looks: stops in time and depth, and what turns tubes.
+
+Frame and units as in ``looks``: SI and radians.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.adjustment.looks import Looks
+
+Array = npt.NDArray[np.float64]
+JOINT, MOUNT, NORTH = "joint", "mount", "north"
+
+
+@dataclass(frozen=True, slots=True)
+class TurnCauses:
+    """Why the yaw that a tube reports is larger than its own: independent causes, of which turns are made.
+
+    Parameters
+    ----------
+    names : (c,) kind and subject of each: ("joint", tube below it), ("mount", tube), ("north", -1), or others
+    of_tubes, of_make_ups : (c, m) and (c, u), change of the turn of every tube and every make-up for one radian of each
+    stds : (c,) rad, of each before the looks
+    """
+
+    names: tuple[tuple[str, int], ...]
+    of_tubes: Array
+    of_make_ups: Array
+    stds: Array
+
+    @property
+    def cov(self) -> Array:
+        """Covariance (m + u, m + u) of the turns, rad^2: ``StringPrior.turn_cov`` but for what has no name."""
+        columns = np.concatenate([self.of_tubes, self.of_make_ups], axis=1).T * self.stds
+        return np.asarray(columns @ columns.T)
+
+    def turned_looks(self, looks: Looks) -> Array:
+        """Change (c, n) of the yaw that each look reports for one radian of each."""
+        return np.asarray(self.of_tubes[:, looks.tube] + self.of_make_ups[:, looks.make_up])
+
+
+@dataclass(frozen=True, slots=True)
+class RunOfStops:
+    """How a string was run.
+
+    Parameters
+    ----------
+    md, time : (k,) m and s, depth of the bit and time of every stop by its number
+    station_md : (s + 1,) m, of collar and stations, as ``PathPrior`` has them
+    causes : of the turns of its tubes
+    """
+
+    md: Array
+    time: Array
+    station_md: Array
+    causes: TurnCauses
+
+
+def chain_causes(
+    from_bit: Sequence[int], make_up_sizes: Sequence[int], joint_std: float, mount_std: float, north_std: float
+) -> TurnCauses:
+    """Causes of a plain chain that grows on top: a joint turns what lies below it once it is made, a mount its tube.
+
+    The zero of the encoder against north turns all.
+
+    Parameters
+    ----------
+    from_bit : tubes in their order from the bit up
+    make_up_sizes : (u,) how many tubes the string had at each make-up
+    joint_std, mount_std, north_std : rad
+    """
+    count, sizes = len(from_bit), np.asarray(make_up_sizes)
+    places = np.argsort(from_bit)
+    joints = np.arange(1, count)[:, None]  # the one below the tube at that place
+    # together, of a look of the tube at place a with b tubes in the string: 1 where a < joint < b
+    of_tubes = [np.where(places >= joints, -1.0, 0.0), np.eye(count), np.ones((1, count))]
+    of_make_ups = [np.where(sizes > joints, 1.0, 0.0), np.zeros((count + 1, len(sizes)))]
+    names = [*((JOINT, tube) for tube in from_bit[:-1]), *((MOUNT, tube) for tube in range(count)), (NORTH, -1)]
+    stds = np.array([joint_std] * (count - 1) + [mount_std] * count + [north_std])
+    return TurnCauses(tuple(names), np.concatenate(of_tubes), np.concatenate(of_make_ups), stds)

@@ -1,0 +1,39 @@
+"""What an adjustment tells of the accelerometer of each tube, as one bias.
+
+The tilt of a mount and a bias across the tube look alike in a hole that hardly bends: only their sum is known well. It
+is that sum where the tube has been, as a bias.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.looks import OF_TUBE, TILT
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class AdjustedBias:
+    """Bias (3,) m/s^2 of one tube's accelerometer with its covariance (3, 3), and of how many looks."""
+
+    bias: Array
+    cov: Array
+    looks: int
+
+
+def bias_of_tube(adjusted: Adjusted, place: int) -> AdjustedBias:
+    """Bias of the tube at a place of the string."""
+    own = adjusted.looks.tube == place
+    forces = adjusted.looks.force[own]
+    x, y, z = forces.mean(axis=0).tolist()
+    as_bias = np.zeros((3, TILT.stop))
+    as_bias[:, :3] = np.eye(3)
+    as_bias[:, TILT] = [[0.0, z], [-z, 0.0], [y, -x]]  # what a tilt about x and about y turns the force into
+    places = OF_TUBE * place + np.arange(TILT.stop)
+    cov = as_bias @ adjusted.common_cov[np.ix_(places, places)] @ as_bias.T
+    return AdjustedBias(as_bias @ adjusted.now.tubes[place, : TILT.stop], cov, int(own.sum()))

@@ -1,0 +1,142 @@
+"""The stations of a wall's columns as a table, with what their instruments know of every station.
+
+Every refusal names file, line, column, what was expected and what came.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.errors import SurveyError
+from groundstation.survey.files.survey_records import read_columns
+from groundstation.survey.wall.wall_columns import ColumnPlan, ColumnSurvey
+from groundstation.survey.well.analysis import RECORD_COLUMNS
+from groundstation.survey.well.reference_frames import SAME_DEPTH
+
+Array = npt.NDArray[np.float64]
+
+
+def read_holes(path: Path, plans: Sequence[ColumnPlan], heights: list[float]) -> list[ColumnSurvey]:
+    """Stations of every column in the order of ``plans``; none of one that was not surveyed.
+
+    Depths of a column are brought to its head by ``heights`` (m), how far what they count from lies above it. A station
+    at 0 m there tells the direction at the head, for between the two the string is straight. Further columns, those of
+    ``RECORD_COLUMNS``, go with the stations where the instrument asks for them.
+
+    Raises
+    ------
+    SurveyError
+        Names file, line and column.
+    """
+    needed = ("column", "md_m", "inclination_deg", "azimuth_deg")
+    table, lines = read_columns(path, needed, texts=("column", *RECORD_COLUMNS))
+    names = [plan.design.name for plan in plans]
+    index = {name: k for k, name in enumerate(names)}
+    owner = np.array([index.get(str(name), -1) for name in table["column"]], np.intp)
+    unknown = np.flatnonzero(owner < 0)
+    if len(unknown):
+        k = int(unknown[0])
+        name = str(table["column"][k])
+        near = [other for other in names if other.casefold() == name.casefold()]
+        hint = f"; {near[0]} is" if near else ""
+        raise SurveyError(f"{path}: line {lines[k]}: column {name} is not among the heads{hint}")
+    order = np.argsort(owner, kind="stable")
+    owner, md, inc, azi = owner[order], *(table[name][order] for name in needed[1:])
+    line = np.array(lines, np.intp)[order]
+    _check_values(path, line, md, inc, azi)
+    counts = np.bincount(owner, minlength=len(names))
+    single = np.flatnonzero(counts == 1)
+    if len(single):
+        raise SurveyError(f"{path}: column {names[single[0]]}: expected at least two stations, got 1")
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    lift = np.array(heights)[owner]
+    at_reference = (np.arange(len(md)) == starts[owner]) & (md == 0.0) & (lift > 0.0)
+    md = np.where(at_reference | (np.abs(md - lift) < SAME_DEPTH), 0.0, md - lift)
+    _check_depths(path, names, owner, line, md, starts[:-1][counts > 0])
+    cells = {name: table[name][order] for name in RECORD_COLUMNS if name in table}
+    parts = [slice(a, b) for a, b in pairwise(starts)]
+    return [
+        ColumnSurvey(
+            md[part],
+            np.radians(inc[part]),
+            np.radians(azi[part]),
+            _record(path, plan, line[part], {name: values[part].tolist() for name, values in cells.items()}),
+        )
+        for plan, part in zip(plans, parts, strict=True)
+    ]
+
+
+def _record(path: Path, plan: ColumnPlan, line: npt.NDArray[np.intp], cells: dict[str, list[str]]) -> dict[str, Array]:
+    """What else the instrument of one column asks for at its stations, by its variable; the head may be without."""
+    found: dict[str, Array] = {}
+    for name, texts in cells.items():
+        variable, unit = RECORD_COLUMNS[name]
+        if not any(texts):
+            continue
+        where = f"{path}: line {line[0]}: column {plan.design.name}: {name}"
+        if not plan.tool.asks_for(variable):
+            if name.startswith("sigma_"):
+                raise SurveyError(f"{where}: the instrument {plan.tool.name} has no use for it; leave it out")
+            continue
+        values = [_station_value(path, int(line[k]), plan, name, text) for k, text in enumerate(texts) if text or k]
+        found[variable] = unit * np.array(values if len(values) == len(texts) else [values[0], *values])
+    return found
+
+
+def _station_value(path: Path, line: int, plan: ColumnPlan, name: str, text: str) -> float:
+    """One number of a station that is not negative."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or value < 0.0 or (name == "measurements" and value < 1.0):
+        least = "of 1 or more" if name == "measurements" else "that is not negative"
+        raise SurveyError(
+            f"{path}: line {line}: column {plan.design.name}: {name}: expected a number {least}, got {text!r}"
+        )
+    return value
+
+
+def _check_depths(
+    path: Path,
+    names: list[str],
+    owner: npt.NDArray[np.intp],
+    line: npt.NDArray[np.intp],
+    md: Array,
+    starts: npt.NDArray[np.intp],
+) -> None:
+    same = np.ones(len(md), bool)
+    same[starts] = False
+    back = np.flatnonzero(same[1:] & ~(np.diff(md) > 0.0)) + 1
+    if len(back):
+        k = int(back[0])
+        raise SurveyError(
+            f"{path}: line {line[k]}: column {names[owner[k]]}: "
+            f"expected a depth beyond {md[k - 1]:g} m, got {md[k]:g} m"
+        )
+    off = starts[md[starts] != 0.0]
+    if len(off):
+        k = int(off[0])
+        raise SurveyError(
+            f"{path}: line {line[k]}: column {names[owner[k]]}: "
+            f"expected the head first, got a station {md[k]:g} m below it"
+        )
+
+
+def _check_values(
+    path: Path, line: npt.NDArray[np.intp], md: Array, inclination_deg: Array, azimuth_deg: Array
+) -> None:
+    for name, values, good in (
+        ("a finite md_m", md, np.isfinite(md)),
+        ("an inclination of 0..180 deg", inclination_deg, (inclination_deg >= 0.0) & (inclination_deg <= 180.0)),
+        ("a finite azimuth_deg", azimuth_deg, np.isfinite(azimuth_deg)),
+    ):
+        wrong = np.flatnonzero(~good)
+        if len(wrong):
+            raise SurveyError(f"{path}: line {line[wrong[0]]}: expected {name}, got {values[wrong[0]]:g}")

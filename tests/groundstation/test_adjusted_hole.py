@@ -1,0 +1,137 @@
+"""A ground station that adjusts the whole hole: what its tubes say about each other, live."""
+
+import math
+import random
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from schemas import check_answers, shown_on
+from test_model import Placed, inclination_deg, knowing, passes
+from test_surveyed_biases import MILLI_G, STOPS, Drilled
+
+from groundstation.config import GroundConfig
+from groundstation.service.alarms.verdict import VerdictDoubt
+from groundstation.service.alarms.verdict_doubts import known_of
+from groundstation.service.answers.model import RigModel
+from groundstation.survey.adjustment.tube_biases import bias_of_tube
+from groundstation.survey.fusion.fusion import Weighting
+
+ADJUSTED = {"weighting": Weighting.ADJUSTED}
+ALIGNED = ADJUSTED | {"mount_tilt_std_deg": 0.01, "accelerometer_bias_std_deg": 0.002}
+
+
+def blamed(model: RigModel) -> dict[str, list[str]]:
+    """What is said to be wrong, by what it is of."""
+    assert model.hole.examined is not None
+    return model.hole.examined.by_subject
+
+
+def test_an_honest_hole_has_nothing_wrong(tmp_path: Path) -> None:
+    model = knowing(tmp_path, passes(5, lambda _stop, station: 1.0 + 0.1 * station), 5, **ALIGNED)
+    assert blamed(model) == {}
+    for station in range(5):
+        assert inclination_deg(model, station) == pytest.approx(1.1 + 0.1 * station, abs=0.02)
+
+
+@pytest.mark.parametrize("order", ["from the bit up", "from the top down", "odd tubes first"])
+@pytest.mark.parametrize("stops", [6, 7])
+def test_a_hole_that_moved_is_said_to_have(tmp_path: Path, order: str, stops: int) -> None:
+    """Two stations move before the last stop; whatever order the tubes answer in, it is the same."""
+    measurements = passes(stops, lambda stop, station: 2.0 if stop == stops and station in (1, 2) else 1.0)
+    place: dict[str, Callable[[int], tuple[int, int]]] = {
+        "from the bit up": lambda tube: (0, tube),
+        "from the top down": lambda tube: (0, -tube),
+        "odd tubes first": lambda tube: ((tube + 1) % 2, tube),
+    }
+    measurements.sort(key=lambda placed: (placed[0].sequence, place[order](placed[0].tube)))
+    model = knowing(tmp_path, measurements, stops, **ALIGNED)
+    assert list(blamed(model)) == ["hole"]
+    for station in range(stops):
+        assert inclination_deg(model, station) == pytest.approx(2.0 if station < 2 else 1.0, abs=0.05), station
+
+
+@pytest.mark.parametrize("outlier", [1, 2, 3])
+def test_an_outlier_at_one_station_moves_no_hole(tmp_path: Path, outlier: int) -> None:
+    measurements = passes(5, lambda stop, station: 2.0 if (stop, station) == (5, outlier) else 1.0)
+    model = knowing(tmp_path, measurements, 5, **ALIGNED)
+    assert blamed(model)
+    assert "hole" not in blamed(model)
+    assert inclination_deg(model, outlier - 1) == pytest.approx(1.0, abs=0.05)
+
+
+@settings(max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(shuffler=st.randoms(use_true_random=False))
+def test_the_same_hole_comes_of_any_order_bit_for_bit(tmp_path: Path, shuffler: random.Random) -> None:
+    measurements = passes(4, lambda _stop, station: 1.0 + 0.1 * station)
+    shuffled = measurements[:]
+    shuffler.shuffle(shuffled)
+    one, other = (numbers_of(knowing(tmp_path, m, 4, **ADJUSTED)) for m in (measurements, shuffled))
+    assert one == other
+
+
+def numbers_of(model: RigModel) -> list[Any]:
+    assert model.hole.examined is not None
+    found = model.hole.examined.adjusted
+    return [found.now.tangents.tolist(), found.now.tubes.tolist(), found.covs.tolist()]
+
+
+def test_raw_sensors_calibrate_themselves_while_they_drill(tmp_path: Path) -> None:
+    """Biases of 1 mg at any tool face, mounts of any tilt: the lower tubes are known to some hundredths of a mg."""
+    squares = []
+    for seed in range(12):
+        hole = Drilled(seed)
+        config = GroundConfig(folder=tmp_path, mount_std_deg=0.0, play_std_deg=0.001, **ADJUSTED)
+        examined = hole.tell(RigModel.begin(config)).hole.examined
+        assert examined is not None
+        for place, tube in enumerate(examined.tubes):
+            one = bias_of_tube(examined.adjusted, place)
+            error = (one.bias - hole.biases[int(tube)])[:2]
+            squares.append(float(error @ np.linalg.solve(one.cov[:2, :2], error)) / 2.0)
+            assert int(tube) > STOPS - 2 or math.sqrt(one.cov[0, 0]) < 0.25 * MILLI_G
+    assert np.mean(squares) < 1.3
+
+
+def test_the_answer_says_what_the_tubes_say_about_each_other(tmp_path: Path) -> None:
+    hole = Drilled(3)
+    model = hole.tell(RigModel.begin(GroundConfig(folder=tmp_path, mount_std_deg=0.0, **ADJUSTED)))
+    shown = shown_on(model, "adjustment")
+    assert "adjustment" in check_answers(model)
+    assert shown["surveys"] == len(hole.surveys)
+    assert [row["tube"] for row in shown["tubes"]] == [1, 2, 3, 4, 5, 6]
+    total = math.sqrt(sum(row["sigma_cm"] ** 2 for row in shown["toe"]))
+    assert total == pytest.approx(shown["sigma_toe_cm"], rel=0.2)  # the larger of two axes, source by source
+    assert [row["sigma_cm"] for row in shown["toe"]] == sorted((row["sigma_cm"] for row in shown["toe"]), reverse=True)
+    assert shown["next_stop"]["sigma_cm"] <= shown["next_stop"]["same_face_cm"]
+    assert shown["blunders"] == []
+
+
+def test_an_answer_of_nothing_is_empty(tmp_path: Path) -> None:
+    model = RigModel.begin(GroundConfig(folder=tmp_path))
+    assert "adjustment" in check_answers(model)
+    shown = shown_on(model, "adjustment")
+    assert (shown["surveys"], shown["misfit"], shown["tubes"], shown["next_stop"]) == (0, None, [], None)
+
+
+def test_stations_that_are_fused_one_by_one_are_adjusted_beside(tmp_path: Path) -> None:
+    """By default stations are fused one by one; what the tubes say about each other can be asked for all the same."""
+    measurements: list[Placed] = passes(4, lambda _stop, _station: 1.0)
+    model = knowing(tmp_path, measurements, 4)
+    assert not model.hole.is_adjusted
+    assert shown_on(model, "adjustment")["surveys"] == len(measurements)
+
+
+def test_what_may_be_one_thing_or_another_makes_the_verdict_unknown(tmp_path: Path) -> None:
+    """A tube that is off from its one stop before the last: its accelerometer stepped, or its mount slipped."""
+    measurements = passes(5, lambda stop, station: 3.0 if stop == 5 and station == 3 else 1.0)
+    model = knowing(tmp_path, measurements, 5, **ADJUSTED, mount_std_deg=0.01)
+    assert model.hole.examined is not None
+    doubts = [
+        doubt for doubt, _ in known_of(model.config, model.string, model.setup, model.hole, model.rig_alarms).doubts
+    ]
+    assert (VerdictDoubt.CONTRADICTION in doubts) == bool(model.hole.examined.doubts)
+    assert blamed(model)
