@@ -25,6 +25,7 @@ from groundstation.survey.adjustment.taken_in import TakenIn, adjust_with, devia
 
 Array = npt.NDArray[np.float64]
 FALSE_ALARM = 1e-3  # of a whole honest hole
+SUSPECTED = 0.05  # of an honest hole at one stop, up to which the covariance has what is suspected in it
 WORTH_TRYING = math.log(1e-3)  # of one hypothesis, before it is tried
 MOST_TRIED = 8
 AS_GOOD = 0.3  # part of the best's logarithm that is worth trying; play hides the rest
@@ -80,10 +81,19 @@ class Blunder:
 
 @dataclass(frozen=True, slots=True)
 class Examination:
-    """A hole adjusted with all blunders that were found, those known before first."""
+    """A hole adjusted with all that was found.
+
+    Parameters
+    ----------
+    adjusted : with the blunders and the suspicion taken in
+    blunders : those known before first
+    suspicion : what may be wrong, but not beyond the false alarms of a whole hole; it is not told as a fault, and
+        the covariance has it in it
+    """
 
     adjusted: Adjusted
     blunders: tuple[Blunder, ...] = ()
+    suspicion: Blunder | None = None
 
     @property
     def global_ratio(self) -> float:
@@ -114,14 +124,18 @@ def examine_hole(
     """
     known = tuple(_judged_again(looks, string, path, run, known, place) for place in range(len(known)))
     now = adjust_with(looks, string, path, run, _taken_in(known), start)
-    found = list(known)
-    while len(found) < MOST_BLUNDERS and is_suspicious(now.found, run):
+    found, suspicion = list(known), None
+    while suspicion is None and len(found) < MOST_BLUNDERS and is_suspicious(now.found, run):
         blunder = find_blunder(looks, string, path, run, now, _taken_in(found))
-        if blunder is None:
+        if blunder is None or blunder.best.log_chance > math.log(SUSPECTED) + log_of_stops(looks):
             break
-        found.append(blunder)
-        now = adjust_with(looks, string, path, run, _taken_in(found), now.found.now)
-    return Examination(now.found, tuple(_resized(one, now, _taken_in(found)) for one in found))
+        if blunder.best.log_chance <= math.log(FALSE_ALARM):
+            found.append(blunder)
+        else:
+            suspicion = blunder
+        now = adjust_with(looks, string, path, run, _taken_in([*found, *filter(None, [suspicion])]), now.found.now)
+    blunders = tuple(_resized(one, now, _taken_in(found)) for one in found)
+    return Examination(now.found, blunders, suspicion)
 
 
 def _resized(blunder: Blunder, now: TakenIn, taken_in: tuple[Hypothesis, ...]) -> Blunder:
@@ -144,7 +158,7 @@ def find_blunder(
     now: TakenIn,
     known: tuple[Hypothesis, ...] = (),
 ) -> Blunder | None:
-    """Find the best explanation of what an adjustment leaves; none where an honest hole may well show as much.
+    """Find the best explanation of what an adjustment leaves, however likely in an honest hole; there may be none.
 
     Parameters
     ----------
@@ -156,26 +170,30 @@ def find_blunder(
     worth = best_of_kinds(score_hypotheses(found, run, hypotheses), found)
     if not worth:
         return None
-    many = math.log(len(hypotheses)) + log_of_stops(looks)
+    many = log_of_level(looks, run)
     adjusted = [_tried(looks, string, path, run, found, known, one) for one in worth]
     tried = [(with_one, _explained(with_one, found, one, many)) for with_one, one in zip(adjusted, worth, strict=True)]
     tried.sort(key=lambda pair: pair[1].log_chance)
     with_best, best = tried[0]
-    if best.log_chance > math.log(FALSE_ALARM):
-        return None
     second = tried[1][1] if len(tried) > 1 else None
     return Blunder(best, second, global_ratio(found), global_ratio(with_best.found))
 
 
 def chance_of_one(looks: Looks, run: RunOfStops) -> float:
     """Chance of a false alarm that one hypothesis has at the last stop, so that a whole hole keeps its own."""
-    return FALSE_ALARM * math.exp(-log_of_stops(looks)) / max(1, sum(1 for _ in all_hypotheses(looks, run)))
+    return FALSE_ALARM * math.exp(-log_of_level(looks, run))
+
+
+def log_of_level(looks: Looks, run: RunOfStops) -> float:
+    """Logarithm of how many chances an honest hole has: of all hypotheses, and of all stops."""
+    hypotheses = sum(1 for _ in all_hypotheses(looks, run))
+    return math.log(max(1, hypotheses)) + log_of_stops(looks)
 
 
 def log_of_stops(looks: Looks) -> float:
-    """Logarithm of k (k + 1), the part of all false alarms that is spent at the stop k: in sum over all stops, one."""
-    count = max(1, len(np.unique(looks.stop)))
-    return math.log(count * (count + 1.0))
+    """Logarithm of k (k + 1) at the stop k: the inverses are, in sum over all stops however many, one."""
+    stops = max(1, len(np.unique(looks.stop)))
+    return math.log(stops * (stops + 1.0))
 
 
 def best_of_kinds(scores: Sequence[Score], found: Adjusted) -> list[Hypothesis]:
@@ -224,9 +242,9 @@ def _judged_again(
     if not blunder.is_doubt or blunder.second is None:
         return blunder
     others = _taken_in([one for k, one in enumerate(known) if k != place])
-    plain = adjust_with(looks, string, path, run, others).found
+    plain, many = adjust_with(looks, string, path, run, others).found, log_of_level(looks, run)
     tried = [
-        _explained(_tried(looks, string, path, run, plain, others, one.hypothesis), plain, one.hypothesis, 0.0)
+        _explained(_tried(looks, string, path, run, plain, others, one.hypothesis), plain, one.hypothesis, many)
         for one in (blunder.best, blunder.second)
     ]
     tried.sort(key=lambda one: one.log_chance)

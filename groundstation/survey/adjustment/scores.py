@@ -145,8 +145,9 @@ def log_tail(squares: Array, told: Places, free: Array) -> Array:
     from scipy.special import betainc, betaln
 
     half, other = 0.5 * free, 0.5 * np.maximum(told, 1)
-    x = free / (free + np.maximum(squares, 1e-12))
-    chance = betainc(half, other, x)
-    leading = half * np.log(x) + (other - 1.0) * np.log1p(-x) - np.log(half) - betaln(half, other)
+    squares = np.maximum(squares, 1e-12)
+    within, beyond = free / (free + squares), squares / (free + squares)
+    chance = betainc(half, other, within)
+    leading = half * np.log(within) + (other - 1.0) * np.log(beyond) - np.log(half) - betaln(half, other)
     found = np.where(chance > 1e-280, np.log(np.maximum(chance, 1e-300)), leading)
     return np.asarray(np.where(told > 0, np.minimum(found, 0.0), 0.0))

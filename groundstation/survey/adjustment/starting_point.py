@@ -49,7 +49,7 @@ def _find_turns(looks: Looks, string: StringPrior, turns: Array, tangents: Array
     for place in np.flatnonzero(wide).tolist():
         own = unknown & ((looks.tube == place) | (string.count + looks.make_up == place))
         others = np.exp(1j * _turns(looks, string, turns)[own])
-        turns[place] -= np.angle(np.sum(seen[own] * (there[own] * others).conj()))
+        turns[place] += np.angle(np.sum(seen[own] * (there[own] * others).conj()))
 
 
 def _mean_directions(looks: Looks, yaws: Array, path: PathPrior, weights: Array) -> Array:

@@ -1,9 +1,10 @@
 """A hole adjusted with blunders that are taken in: as further unknowns, or put right in the looks themselves.
 
 A step of a bias is a further unknown with a wide prior. A turn is so too, and the looks are turned back by what is
-found until nothing more is, for a turn of many degrees is not linear; nor is a wrong depth where the hole bends. What
-has a known size (axes or tubes exchanged) is put right in the looks. Source: Teunissen, "An integrity and quality
-control procedure for use in multi sensor integration", ION GPS (1990): detection, identification, adaptation.
+found until nothing more is, for a turn of many degrees is not linear; nor is a wrong depth where the hole bends, and
+what a tilt does hangs on the lean of the hole, which it has spoilt, so columns are made at least twice. What has a
+known size (axes or tubes exchanged) is put right in the looks. Source: Teunissen, "An integrity and quality control
+procedure for use in multi sensor integration", ION GPS (1990): detection, identification, adaptation.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ from groundstation.survey.adjustment.starting_point import first_start
 
 Array = npt.NDArray[np.float64]
 WIDE_FORCE, WIDE_TILT, WIDE_TURN, WIDE_DEPTH = 1.0, 0.2, 3.0, 10.0  # m/s^2, rad, rad, m before a blunder is found
+BENT = (*BY_DEPTH, *BY_TILT, BlunderKind.HOLE_MOVED)  # whose columns are others once the hole stands right
 ROUNDS = 4
 SETTLED, STRAIGHT = 0.1, 0.01  # standard deviations, and rad or m, of a turn or depth that is found in addition
 
@@ -71,15 +73,16 @@ def adjust_with(
     looks = put_right(looks, blunders)
     sought = [one for one in blunders if one.kind not in KNOWN_SIZE]
     now = replace(start or first_start(looks, string, path), extra=np.zeros(0))
-    is_turn, is_bent = (_is_of(sought, kinds) for kinds in (BY_TURN, BY_DEPTH))
+    is_turn, is_bent = (_is_of(sought, kinds) for kinds in (BY_TURN, BENT))
     sizes, turned = np.zeros(len(is_turn)), looks
-    for _ in range(ROUNDS if np.any(is_turn | is_bent) else 1):
+    for again in range(ROUNDS if np.any(is_turn | is_bent) else 1):
         extra = further_effects(turned, run, sought, now, sizes)
         found = adjust_hole(turned, string, path, extra, replace(now, extra=np.zeros(len(extra.std))))
         cov = found.common_cov[len(found.common_cov) - len(sizes) :, len(found.common_cov) - len(sizes) :]
         before, sizes = sizes, found.now.extra + np.where(is_turn, sizes, 0.0)
         more = np.abs(sizes - before)
-        if np.all((more <= np.minimum(SETTLED * np.sqrt(np.diag(cov)), STRAIGHT))[is_turn | is_bent]):
+        enough = np.minimum(SETTLED * np.sqrt(np.diag(cov)), STRAIGHT)
+        if again and np.all((more <= enough)[is_turn | is_bent]):
             break
         now = replace(found.now, extra=np.zeros(0))
         turned = _turned_back(looks, run, sought, sizes)

@@ -11,6 +11,7 @@ import pytest
 from blame_table import examined, examined_as_it_grows, toe_departure, verdict
 from dense_hole import DenseHole, walk
 from drawn_strings import DEG, MG, SIZES, DrawnString, draw_string
+from scipy.stats import f as f_distribution
 
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.blunder_words import SENTENCES, say_blunder
@@ -23,7 +24,7 @@ from groundstation.survey.adjustment.hypotheses import (
     effect_amplitudes,
     thinned_stops,
 )
-from groundstation.survey.adjustment.scores import score_hypotheses
+from groundstation.survey.adjustment.scores import log_tail, score_hypotheses
 from groundstation.survey.adjustment.screen import is_suspicious
 from groundstation.survey.adjustment.taken_in import adjust_with, deviance_of
 
@@ -164,6 +165,18 @@ def test_a_look_that_may_be_the_first_of_a_step_is_a_doubt() -> None:
     assert len(one.taken_in) == 2
 
 
+@pytest.mark.slow
+def test_a_suspicion_is_not_told_and_stands_in_the_covariance() -> None:
+    """The encoder slips by 7.2 deg at the third stop, where the hole hardly leans: hardly anything shows it."""
+    drawn = draw_string(39, "encoder_slipped", 7.2)
+    found = examined(drawn)
+    assert drawn.onset == 2
+    assert found.blunders == ()
+    assert found.suspicion is not None
+    assert found.suspicion.best.hypothesis == Hypothesis(K.ENCODER_SLIPPED, (), 2)
+    assert toe_departure(found, drawn) < 13.8  # one in a thousand of chi-square with two degrees of freedom
+
+
 def test_two_blunders_are_found_one_after_another() -> None:
     drawn = draw_string(5, "bias_stepped", 17.0)
     yaw = drawn.looks.yaw + np.where(drawn.looks.stop >= 7, 7.2 * DEG, 0.0)
@@ -220,6 +233,17 @@ def test_no_two_hypotheses_of_a_kind_are_one(honest: DrawnString) -> None:
         if kind in OF_FORCE:
             rows = [tuple(effect_amplitudes(one, honest.looks, honest.run)) for one in some]
             assert len(set(rows)) == len(rows)
+
+
+@pytest.mark.parametrize("free", [5.0, 90.0, 1e9])
+@pytest.mark.parametrize("width", [1, 2, 3])
+def test_the_tail_is_that_of_f_and_goes_on_where_that_ends(width: int, free: float) -> None:
+    squares = np.array([0.01, 1.0, 30.0, 500.0])
+    told, tails = np.full(4, width), f_distribution.logsf(squares / width, width, free)
+    np.testing.assert_allclose(log_tail(squares, told, np.full(4, free)), tails, rtol=1e-4, atol=1e-9)
+    far = log_tail(np.array([1e4, 1e19]), told[:2], np.full(2, free))
+    assert np.all(np.isfinite(far))
+    assert far[1] < far[0] < tails[-1]
 
 
 @pytest.mark.parametrize("count", [1, 16, 17, 24, 25, 400])

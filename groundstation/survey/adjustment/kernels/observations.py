@@ -50,7 +50,7 @@ def linearise_looks(
         px = gravity * (mx + ty * mz) + own[0]
         py = gravity * (my - tx * mz) + own[1]
         lean = px * px + py * py
-        across = math.atan2(f[0] * py - f[1] * px, f[0] * px + f[1] * py)
+        across = math.atan2(px * f[1] - py * f[0], px * f[0] + py * f[1])
         noise = force_var[k] + gravity * gravity * play_var * mz * mz
         e = across * yaw_var[k] / (yaw_var[k] + noise / max(lean, 1e-12))
         c, s = math.cos(psi - e), math.sin(psi - e)

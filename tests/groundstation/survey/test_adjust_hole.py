@@ -1,0 +1,105 @@
+"""An adjusted hole against drawn truths: directions within their sigmas, whatever is known of yaws and joints."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.spatial.transform import Rotation
+
+from groundstation.survey.adjustment.adjust import adjust_hole
+from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks, PathPrior, StringPrior
+
+Array = npt.NDArray[np.float64]
+DEG = math.pi / 180.0
+G = 9.79
+NOISE, PLAY, TURN_STD = 5e-4, 0.008 * DEG, 0.05 * DEG
+TUBES, LENGTH = 5, 3.0
+
+
+def drawn_hole(
+    seed: int, inclination: float, yaw_std: float, turns: Array
+) -> tuple[Looks, StringPrior, PathPrior, Array]:
+    """Five tubes that passed five stations of a hole that bends by some tenths of a degree a station."""
+    random = np.random.default_rng(seed)
+    angles = inclination + 0.2 * DEG * np.cumsum(random.standard_normal(TUBES + 1))
+    azimuths = 2.0 + 0.3 * DEG * np.cumsum(random.standard_normal(TUBES + 1)) / max(math.sin(inclination), 0.05)
+    truth = np.stack([np.sin(angles) * np.cos(azimuths), np.sin(angles) * np.sin(azimuths), np.cos(angles)], axis=1)
+    bias, rows = 0.01 * random.standard_normal((TUBES, 3)), []
+    turns = turns + TURN_STD * random.standard_normal(TUBES)
+    for stop in range(TUBES):
+        for tube in range(stop + 1):
+            station, face = stop - tube + 1, random.uniform(0.0, math.tau)
+            force = felt(truth[station], face, PLAY * random.standard_normal(2)) + bias[tube]
+            yaw = face + turns[tube] + yaw_std * random.standard_normal()
+            rows.append((station, tube, stop, *(force + NOISE * random.standard_normal(3)), yaw))
+    table = np.array(rows)
+    station, tube, stop = (np.ascontiguousarray(column.astype(np.intp)) for column in table.T[:3])
+    known = np.full(len(table), NOISE**2)
+    forces, yaws = np.ascontiguousarray(table[:, 3:6]), table[:, 6].copy()
+    looks = Looks(station, tube, np.zeros_like(tube), stop, forces, known, yaws, np.full(len(table), yaw_std**2))
+    string = StringPrior(
+        np.full(TUBES, 0.01), np.full(TUBES, 1e-6), np.zeros(TUBES + 1), np.diag([TURN_STD**2] * TUBES + [1e-12]), G,
+        1e-3, PLAY,
+    )  # fmt: skip
+    across = np.eye(3) - np.outer(truth[0], truth[0])
+    md = LENGTH * np.arange(TUBES + 1)
+    return looks, string, PathPrior(md, truth[0], DEG**2 * across, 0.4 * DEG, 30.0), truth
+
+
+def felt(tangent: Array, face: float, tilt: Array) -> Array:
+    """Specific force of a tube at rest: the shortest turn from the vertical to its axis, after a turn about it."""
+    axis = np.cross([0.0, 0.0, 1.0], tangent)
+    angle = math.atan2(float(np.linalg.norm(axis)), float(tangent[2]))
+    lean = Rotation.from_rotvec(axis / max(float(np.linalg.norm(axis)), 1e-12) * angle)
+    body = lean * Rotation.from_euler("z", face)
+    return np.asarray(Rotation.from_rotvec([*tilt, 0.0]).apply(body.inv().apply([0.0, 0.0, -G])))
+
+
+def squares_of(found: Adjusted, truth: Array) -> Array:
+    """Normalised squares (s,) of the errors of inclination and azimuth of the stations, each of two numbers.
+
+    A yaw that is known to some degrees moves a direction on a circle, which is straight in these two alone.
+    """
+    there = found.now.tangents[1:]
+    (inclination, azimuth), (true_inclination, true_azimuth) = polar(there), polar(truth[1:])
+    sine = np.sin(inclination)
+    down = np.stack([np.cos(inclination) * np.cos(azimuth), np.cos(inclination) * np.sin(azimuth), -sine], axis=1)
+    level = np.stack([-np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)], axis=1)
+    axes = np.einsum("kpi,kai->kpa", np.stack([down, level], axis=1), found.bases[1:])
+    covs = axes @ found.covs[1:, :2, :2] @ np.swapaxes(axes, 1, 2)
+    around = np.angle(np.exp(1j * (true_azimuth - azimuth)))
+    errors = np.stack([true_inclination - inclination, around * sine], axis=1)
+    return np.asarray(np.einsum("ka,kab,kb->k", errors, np.linalg.inv(covs), errors) / 2.0)
+
+
+def polar(tangents: Array) -> tuple[Array, Array]:
+    """Inclination and azimuth (s,) of unit vectors (s, 3)."""
+    level = np.hypot(tangents[:, 0], tangents[:, 1])
+    return np.arctan2(level, tangents[:, 2]), np.arctan2(tangents[:, 1], tangents[:, 0])
+
+
+@pytest.mark.parametrize("yaw_std_deg", [0.02, 3.0])
+@pytest.mark.parametrize("inclination_deg", [0.5, 30.0, 88.0, 90.5, 140.0])
+def test_directions_are_within_their_sigmas_at_every_inclination(inclination_deg: float, yaw_std_deg: float) -> None:
+    """300 stations, five a hole that share their tubes: the mean of their squares is one within its standard error."""
+    squares = []
+    for seed in range(60):
+        looks, string, path, truth = drawn_hole(seed, inclination_deg * DEG, yaw_std_deg * DEG, np.zeros(TUBES))
+        squares.append(squares_of(adjust_hole(looks, string, path), truth))
+    assert 0.75 < np.mean(squares) < 1.3
+
+
+@pytest.mark.parametrize("turn_deg", [25.0, 100.0, 170.0])
+def test_an_untold_joint_is_found_from_what_other_tubes_saw(turn_deg: float) -> None:
+    turns = np.array([0.0, 0.0, turn_deg * DEG, 0.0, 0.0])
+    looks, string, path, truth = drawn_hole(3, 4.0 * DEG, 0.02 * DEG, turns)
+    cov = string.turn_cov.copy()
+    cov[2, 2] = math.pi**2 / 3.0
+    found = adjust_hole(looks, replace(string, turn_cov=cov), path)
+    std = math.sqrt(found.common_cov[2 * OF_TUBE + TURN, 2 * OF_TUBE + TURN])
+    assert std < 2.0 * DEG
+    assert found.now.tubes[2, TURN] == pytest.approx(turns[2], abs=4.0 * std)
+    assert np.max(squares_of(found, truth)) < 8.0
