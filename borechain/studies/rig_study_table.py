@@ -76,7 +76,7 @@ RIG_STUDIES: Final = by_name(
             ),
             counts="rigs",
             drawn=False,
-            full=("--seeds 200 --honest 1000",),
+            full=("--seeds 4 --honest 300",),
             short="--seeds 1 --honest 1",
         ),
     ],
