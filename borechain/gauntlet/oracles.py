@@ -33,6 +33,7 @@ TOLD = frozenset(
 DEPTH = frozenset({"depth_refused", "depth_contradicts"})  # alarms while which no depth since a gap is sure
 YAW = frozenset({"reference", "joint"})  # alarms while which no yaw is sure, where encoder or sensors have failed
 RECEIPT = msgpack.packb({"k": int(MessageKind.RECEIPT)})[1:]  # in every frame with a receipt
+SURELY_FOUND = 2.0  # times the smallest blunder that is stated to be found
 UNKNOWN_DEG = 20.0  # of an azimuth whose yaws are all unknown, at least
 
 
@@ -156,11 +157,13 @@ def find_violations(
     rows = rig.inline.ask("measurements")["measurements"]
     misled = misled_by(rig.world.deceptions)
     depth_can_be_judged = depth_can_be_judged and "depth" not in misled
-    encoder_can_be_judged = encoder_can_be_judged and "direction" not in misled
+    is_bent = encoder_can_be_judged and "direction" in misled and not warned & YAW
+    encoder_can_be_judged = encoder_can_be_judged and not misled & {"direction", "north"}
     return [
         *_each_once(rows),
         *(() if standing & DEPTH or not depth_can_be_judged else _depths(rows, rig.world)),
         *(() if _is_told(rig.world, warned) or not encoder_can_be_judged else _directions(rig)),
+        *(_beyond_reliability(rig) if is_bent else ()),
         *_flags(rig.inline.ground.model.hole),
         *(_missing(rows, rig, standing | (told & {"depth_refused"})) if depth_can_be_judged else ()),
         *_health(rig.inline.ask("status")["health"], standing),
@@ -212,6 +215,29 @@ def _directions(rig: GauntletRig) -> Iterator[str]:
         size = math.hypot(along / sigma_along, across / sigma_across)
         if size > SIGMAS:
             yield f"station at {station['md_m']:.2f} m is {size:.1f} sigmas from the truth"
+
+
+def _beyond_reliability(rig: GauntletRig) -> Iterator[str]:
+    """Directions that a deception has bent by more than what is stated to be found, without a word of it.
+
+    A blunder of the smallest size that is stated is found four times in five, one of twice that size always.
+    """
+    found, verdict = rig.inline.ask("adjustment"), rig.inline.ask("verdict")
+    if found["blunders"] or set(verdict["doubts"]) - {"setup"}:
+        return
+    steps = [row["smallest_step_mg"] for row in found["tubes"]]
+    if not steps or None in steps:
+        return  # it is said that nothing can tell
+    for station in rig.inline.ask("stations")["stations"]:
+        off_mg = 1e3 * math.sin(_angle_off(station, rig.world.truth_station(station["md_m"])))
+        if off_mg > SURELY_FOUND * max(steps):
+            yield f"station at {station['md_m']:.2f} m is off by {off_mg:.0f} mg, {max(steps):.0f} are said to be found"
+
+
+def _angle_off(one: dict[str, Any], other: dict[str, Any]) -> float:
+    """Angle (rad) between two directions."""
+    (i, a), (j, b) = ((math.radians(row["inclination_deg"]), math.radians(row["azimuth_deg"])) for row in (one, other))
+    return math.acos(min(math.cos(i) * math.cos(j) + math.sin(i) * math.sin(j) * math.cos(a - b), 1.0))
 
 
 def _flags(hole: SurveyedHole) -> Iterator[str]:
