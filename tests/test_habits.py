@@ -1,6 +1,7 @@
 """Habits: every target is explained, every result has its caption, hook and check run what they claim to run."""
 
 import ast
+import functools
 import inspect
 import re
 import subprocess
@@ -214,6 +215,7 @@ EXCUSED = {  # file or folder: why the phrases stand there
 }
 
 
+@functools.cache
 def texts() -> list[Path]:
     """Files of the project that people write or read, relative to its root."""
     files = [*ROOT.glob("*"), *(path for room in ROOMS for path in (ROOT / room).rglob("*"))]
@@ -222,7 +224,8 @@ def texts() -> list[Path]:
 
 def odd_lines(path: Path) -> list[str]:
     """Lines of a file with a phrase that a stranger stumbles over, as path, number and line."""
-    lines = (ROOT / path).read_text(encoding="utf-8", errors="replace").splitlines()
+    text = (ROOT / path).read_text(encoding="utf-8", errors="replace")
+    lines = text.splitlines() if ODD.search(text) else []
     return [f"{path.as_posix()}:{number}: {line.strip()}" for number, line in enumerate(lines, 1) if ODD.search(line)]
 
 

@@ -6,8 +6,11 @@ Each exception stands here with its reason, and goes from here as soon as it is 
 from __future__ import annotations
 
 import ast
+import itertools
 from collections import defaultdict
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -44,11 +47,39 @@ FUNCTIONS = {
 }
 
 
-def modules() -> Iterator[tuple[Path, ast.Module]]:
-    """Every module of product code with its tree."""
-    for package in PACKAGES:
-        for path in sorted((ROOT / package).rglob("*.py")):
-            yield path.relative_to(ROOT), ast.parse(path.read_text())
+@dataclass(frozen=True, slots=True)
+class Named:
+    """What a module declares at its top: a class, or a function that is no command."""
+
+    name: str
+    place: str  # module and line
+    is_class: bool
+
+
+@cache
+def modules() -> dict[Path, list[Named]]:
+    """What every module of product code declares; their trees would be a million objects of every worker."""
+    paths = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
+    return {path.relative_to(ROOT): list(declared(path)) for path in paths}
+
+
+def declared(path: Path) -> Iterator[Named]:
+    """Classes and functions of a module."""
+    for node in ast.parse(path.read_text()).body:
+        place = f"{path.relative_to(ROOT)}:{node.lineno}"
+        if isinstance(node, ast.ClassDef):
+            yield Named(node.name, place, is_class=True)
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and not is_command(node):
+            yield Named(node.name, place, is_class=False)
+
+
+def places_of(*, classes: bool) -> dict[str, list[str]]:
+    """Where each class, or each function, of a name stands."""
+    places = defaultdict(list)
+    for one in itertools.chain.from_iterable(modules().values()):
+        if one.is_class == classes:
+            places[one.name].append(one.place)
+    return places
 
 
 def is_command(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
@@ -59,13 +90,7 @@ def is_command(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
 
 def one_word_functions() -> dict[str, list[str]]:
     """Public functions of modules whose name is one word, with where they stand."""
-    found = defaultdict(list)
-    for path, tree in modules():
-        for node in tree.body:
-            if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) or "_" in node.name or is_command(node):
-                continue
-            found[node.name].append(f"{path}:{node.lineno}")
-    return found
+    return {name: places for name, places in places_of(classes=False).items() if "_" not in name}
 
 
 def repeated(places: dict[str, list[str]]) -> dict[str, list[str]]:
@@ -73,19 +98,14 @@ def repeated(places: dict[str, list[str]]) -> dict[str, list[str]]:
 
 
 def test_a_class_name_means_one_thing() -> None:
-    places = defaultdict(list)
-    for path, tree in modules():
-        for node in tree.body:
-            if isinstance(node, ast.ClassDef):
-                places[node.name].append(f"{path}:{node.lineno}")
-    taken = repeated(places)
+    taken = repeated(places_of(classes=True))
     assert {name: found for name, found in taken.items() if name not in CLASSES} == {}
     assert CLASSES.keys() <= taken.keys(), "a reason whose name is unique by now"
 
 
 def test_a_module_name_means_one_thing() -> None:
     places = defaultdict(list)
-    for path, _ in modules():
+    for path in modules():
         if path.stem not in ("__init__", "__main__"):
             places[path.stem].append(str(path))
     taken = repeated(places)

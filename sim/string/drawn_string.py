@@ -89,8 +89,7 @@ class DrawnString:
     def drill(self, seed: int) -> DrawnRun:
         """Every cycle of the run of a seed."""
         world, count = World(self.scenario, seed), self.scenario.tubes
-        rough = None if self.rough is None else self.rough.run(world)
-        schedule = redraw_schedule(self.schedule, world, measure_head(world) if rough is None else rough.measured)
+        schedule, rough = self.redraw(world)
         loop, nodes, log = loop_of("float64", count), new_nodes(world), self.new_log()
         given = *loop, nodes, schedule, draw_hops(world), np.zeros(count), new_memory(), 0, world.cycles
         field = None if rough is None else rough.field
@@ -98,6 +97,12 @@ class DrawnString:
         errors = [world.marks.errors(tube) - self.scenario.file.told.north for tube in range(1, count + 1)]
         systematic = np.array([np.pad(error, (tube, 0), "edge") for tube, error in enumerate(errors, 1)])
         return DrawnRun(schedule, log.surveys[: int(log.made[0])], log.states, frames_of(world), systematic, rough)
+
+    def redraw(self, world: World) -> tuple[StringSchedule, FieldRun | None]:
+        """Schedule of a world's seed with what its encoder measures, and its rough world if it is one."""
+        rough = None if self.rough is None else self.rough.run(world)
+        measured = measure_head(world) if rough is None else rough.measured
+        return redraw_schedule(self.schedule, world, measured), rough
 
     def new_readings(self, world: World) -> DrawnReadings:
         """What the readings of a world's seed are drawn from."""

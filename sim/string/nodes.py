@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -36,10 +35,11 @@ class StringNodes(NamedTuple):
 def new_nodes(world: World, state_every: int = NEVER) -> StringNodes:
     """Nodes that know nothing yet; ``state_every``: cycles between two states of one."""
     config = tuned_config(world.scenario.file)
-    told = [replace(world.tube_settings(k + 1), state_every=state_every) for k in range(world.scenario.tubes)]
+    told = [world.tube_settings(k + 1) for k in range(world.scenario.tubes)]
     corrections = np.zeros((len(told), 1 + world.scenario.file.node.imus), PARAMETERS)
     corrections[:] = identity_parameters()
     settings = np.concatenate([settings_record(one, config) for one in told])
+    settings["state_every"] = state_every
     return StringNodes(np.repeat(new_node(config), len(told)), settings, corrections)
 
 

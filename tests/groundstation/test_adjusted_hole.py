@@ -135,3 +135,26 @@ def test_what_may_be_one_thing_or_another_makes_the_verdict_unknown(tmp_path: Pa
     ]
     assert (VerdictDoubt.CONTRADICTION in doubts) == bool(model.hole.examined.doubts)
     assert blamed(model)
+
+
+def test_a_north_that_was_not_told_is_in_every_azimuth_and_in_no_inclination(tmp_path: Path) -> None:
+    measurements = passes(5, lambda _stop, station: 1.0 + 0.1 * station)
+    told, untold = (
+        shown_on(knowing(tmp_path, measurements, 5, **(ALIGNED | north)), "stations")["stations"]
+        for north in ({}, {"north_std_deg": None})
+    )
+    for one, other in zip(told, untold, strict=True):
+        assert one["sigma_azimuth_deg"] < 5.0
+        assert other["sigma_azimuth_deg"] > 60.0
+        assert other["inclination_deg"] == pytest.approx(one["inclination_deg"], abs=0.01)
+        assert other["sigma_inclination_deg"] == pytest.approx(one["sigma_inclination_deg"], rel=0.1)
+
+
+def test_the_setup_of_an_adjusted_hole_has_the_costs_of_the_adjustment(tmp_path: Path) -> None:
+    hole = Drilled(3)
+    model = hole.tell(RigModel.begin(GroundConfig(folder=tmp_path, mount_std_deg=0.0, **ADJUSTED)))
+    items = {row["item"]: row["toe_cm"] for row in shown_on(model, "setup")["items"]}
+    toe = {(row["source"], row["subject"]): row["sigma_cm"] for row in shown_on(model, "adjustment")["toe"]}
+    for tube in (1, 2, 3):
+        assert items[f"mount.{tube}"] == pytest.approx(toe["tilt", f"tube {tube}"], rel=0.01)
+    assert items["play"] == pytest.approx(toe["play", ""], rel=0.01)

@@ -1,6 +1,8 @@
 """Wells and tools that the tests of the error model share."""
 
 import math
+import warnings
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +15,14 @@ SITE = Site(9.80665, 50_000.0, 72.0 * DEG, 3.0 * DEG, 60.0 * DEG)
 WELLS = 200  # against the independent library
 MWD = load_tool("mwd-rev5.1")
 Angles = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+def import_welleng() -> Any:
+    """The library ``welleng``; it takes half a second, which only the tests pay that compare with it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import welleng.survey
+    return welleng
 
 
 def tool_of(*terms: Term, **more: object) -> SurveyTool:

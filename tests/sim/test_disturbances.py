@@ -14,16 +14,14 @@ from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, READING, SPL
 from sim.campaign.chunk import Campaign
 from sim.errors import ScenarioError
 from sim.string.allowlist import UNUSED, is_expressed, refused_keys
-from sim.string.drawn_string import frames_of
-from sim.string.reading_suppliers import felt_by
-from sim.string.rough_runs import RoughWorld
+from sim.string.drawn_string import DrawnString
 from sim.studies.scenarios import Tables, change_sections
 from sim.world.disturbance.chain import lane_starts
 from sim.world.disturbance.disturbance_table import TABLE
 from sim.world.disturbance.lanes import draw_further, draw_numbers
-from sim.world.disturbance.records import make_shared, make_tubes
+from sim.world.disturbance.records import make_tubes
 from sim.world.disturbance.row import OneImu
-from sim.world.disturbance.sensor_reading import DRAWN, constants_of, read_frames, read_sensors
+from sim.world.disturbance.sensor_reading import constants_of, read_frames, read_sensors
 from sim.world.scenario import Scenario, scenario_of
 from sim.world.scenario_file import ScenarioFile
 from sim.world.world import World
@@ -134,29 +132,31 @@ def rig_rows(scenario: Scenario, seed: int) -> np.ndarray:
     return rows
 
 
-def campaign_rows(scenario: Scenario, seed: int, tube: int = 1) -> np.ndarray:
-    """What a tube of a campaign reads, likewise, as if it were in the string from the first cycle on."""
-    world, rough = World(scenario, seed), scenario.file.rough
-    shared, drawn, reading = make_shared(scenario.file)[0], np.zeros(DRAWN), np.zeros((1, READING))
-    own = make_tubes(scenario.file, seed, frames_of(world))[tube - 1]
-    draws = np.zeros(4, np.uint64), np.array([seed, 0], np.uint64), np.zeros(4, np.uint64)
-    felt = felt_by(scenario, world.motion.starting_at(0.0), world.ends)
-    run = None if rough is None else RoughWorld(world, rough).run(world)
-    rows = np.zeros((world.cycles, READING))
-    for cycle, end in enumerate((world.ends + world.phase(tube)).tolist()):
-        place = cycle, tube - 1
-        draw_numbers(*draws, drawn, *place)
+def read_campaign(string: DrawnString, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """What the encoder of a campaign measures, and what its tubes read, (tubes, cycles, READING).
+
+    The tubes read as if they were in the string from the first cycle on.
+    """
+    world = World(string.scenario, seed)
+    (schedule, run), drawn, reading = string.redraw(world), string.new_readings(world), np.zeros((1, READING))
+    draws, numbers, shared = (drawn.counter, drawn.key, drawn.words), drawn.numbers, drawn.shared[0]
+    rows = np.zeros((len(drawn.tubes), world.cycles, READING))
+    for (tube, cycle), end in np.ndenumerate(schedule.ends + schedule.later[:, None]):
+        place, own, is_first = (cycle, tube), drawn.tubes[tube], cycle == 0
+        draw_numbers(*draws, numbers, *place)
         if run is None:
-            read_sensors(shared, own, cycle == 0, *felt, drawn, reading, end, *place)
+            read_sensors(shared, own, is_first, *drawn.felt, numbers, reading, end, *place)
         else:
             draw_further(*draws, run.field.desk.drawn, *place)
-            read_frames(shared, own, cycle == 0, run.field, drawn, reading, end, *place)
-        rows[cycle] = reading[0]
-    return rows
+            read_frames(shared, own, is_first, run.field, numbers, reading, end, *place)
+        rows[tube, cycle] = reading[0]
+    return schedule.measured, rows
 
 
-def off(tables: Tables) -> Scenario:
-    return scenario_of(dict(ROUGH if "rough" in tables else PLAIN))
+@functools.cache
+def quiet_rows(*, is_rough: bool) -> np.ndarray:
+    """What the only tube of a rig reads with every row of the table off."""
+    return rig_rows(scenario_of(dict(ROUGH if is_rough else PLAIN)), SEED)
 
 
 def test_every_row_of_the_table_is_tried_once() -> None:
@@ -166,7 +166,7 @@ def test_every_row_of_the_table_is_tried_once() -> None:
 @pytest.mark.parametrize("name", [row.name for row in TABLE])
 def test_a_row_that_is_on_changes_what_a_rig_reads(name: str) -> None:
     tables = EXACT.get(name) or REFUSED.get(name) or DRAWN_ANEW[name][0]
-    before, after = rig_rows(off(tables), SEED), rig_rows(scenario_of(dict(tables)), SEED)
+    before, after = quiet_rows(is_rough="rough" in tables), rig_rows(scenario_of(dict(tables)), SEED)
     assert np.abs(after - before).max() > 5e-5  # the earth's rate is 7.3e-5 rad/s
 
 
@@ -185,7 +185,7 @@ def test_a_row_without_a_form_for_campaigns_is_refused_by_its_key(name: str) -> 
 def test_a_row_without_noise_reads_in_a_campaign_what_it_reads_in_a_rig(name: str) -> None:
     """In a rough world frames come up to half a place of ``PLACES``, 0.3 ms, from where they come in a rig."""
     scenario = scenario_of(dict(EXACT[name]))
-    apart = np.abs(campaign_rows(scenario, SEED) - rig_rows(scenario, SEED))
+    apart = np.abs(read_campaign(DrawnString(scenario), SEED)[1][0] - rig_rows(scenario, SEED))
     if scenario.file.rough is None:
         assert apart[:, :6].max() < 1e-8
         return
@@ -203,7 +203,8 @@ def test_a_row_without_noise_reads_in_a_campaign_what_it_reads_in_a_rig(name: st
 )
 def test_what_is_drawn_anew_is_distributed_as_in_a_rig(name: str, which: int) -> None:
     scenario = scenario_of(dict(DRAWN_ANEW[name][which]))
-    pairs = [(campaign_rows(scenario, seed)[:, :6], rig_rows(scenario, seed)[:, :6]) for seed in range(1, 7)]
+    string = DrawnString(scenario)
+    pairs = [(read_campaign(string, seed)[1][0, :, :6], rig_rows(scenario, seed)[:, :6]) for seed in range(1, 7)]
     turning = np.abs(World(scenario, 1).motion.drive(World(scenario, 1).ends - 1.0)[1]) > 1.2
     still = ~turning & ~np.roll(turning, 8) & ~np.roll(turning, -8)
     for phase in (turning & np.roll(turning, 4) & np.roll(turning, -4), still):
@@ -429,12 +430,11 @@ def put(tables: dict[str, Any], within: list[str], last: str, value: Any) -> dic
 
 @functools.lru_cache(maxsize=8)
 def _found(tables: str) -> tuple[dict[str, np.ndarray], list[np.ndarray]]:
-    scenario = scenario_of(ast.literal_eval(tables))
-    campaign = Campaign(scenario)
+    campaign = Campaign(scenario_of(ast.literal_eval(tables)))
     chunk = campaign.chunk(SEED, SEED)
     columns = {**chunk.surveys, **{f"epochs {name}": values for name, values in chunk.epochs.items()}}
-    measured = campaign.string.drill(SEED).schedule.measured
-    return columns, [measured, *(campaign_rows(scenario, SEED, tube) for tube in range(1, scenario.tubes + 1))]
+    measured, rows = read_campaign(campaign.string, SEED)
+    return columns, [measured, *rows]
 
 
 def found_alike(one: Tables, other: Tables) -> bool:

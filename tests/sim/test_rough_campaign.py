@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 from node_by_node import measure_by_firmware
-from scipy.signal import welch
-from scipy.stats import ks_2samp
 
 from node.kernels.record.filter_record import PARTS
 from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, READING, SPLIT, TEMPERATURE
@@ -174,6 +172,8 @@ def test_the_encoder_measures_what_it_measures_in_the_rough_world() -> None:
 
 def test_frames_of_a_vibration_have_the_spectrum_of_the_worlds() -> None:
     section = field_of().file.rough
+    from scipy.signal import welch
+
     assert section is not None
     frame, hertz, random = 1.0 / (50.0 * 1.01), section.samples_hz, np.random.default_rng(1)
     vibration = section.vibration
@@ -190,6 +190,8 @@ def test_frames_of_a_vibration_have_the_spectrum_of_the_worlds() -> None:
 
 
 def test_errors_are_distributed_as_those_of_the_string_of_the_studies() -> None:
+    from scipy.stats import ks_2samp
+
     scenario = field_of()
     epochs = Campaign(scenario).chunk(101, 220).epochs
     normed = epochs["yaw_error"] / np.sqrt(epochs["yaw_var"] + epochs["systematic_var"])

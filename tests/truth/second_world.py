@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import butter, lfilter, sosfilt, sosfilt_zi
 
 from node.firmware.encoder_node import EncoderNode, EncoderSample
 from node.process.drivers.fifo_window import parts_of
@@ -168,6 +167,8 @@ class SecondWorld:
 
     def _band(self) -> Array:
         """Noise of rms 1 between 20 and 300 Hz (n,)."""
+        from scipy.signal import butter, sosfilt  # a second, which only a world with vibration or a filter pays
+
         sections = butter(4, [20.0, 300.0], "bandpass", fs=HERTZ, output="sos")
         noise = sosfilt(sections, self.random.standard_normal(len(self.t)))
         return np.asarray(noise / noise.std())
@@ -234,6 +235,8 @@ class SecondWorld:
         phi = math.exp(-1.0 / (HERTZ * WANDER_TAU))
         kicks = random.standard_normal(rate.shape)
         kicks[1:] *= math.sqrt(1.0 - phi * phi)
+        from scipy.signal import lfilter
+
         wander = GYRO_WANDER * lfilter([1.0], [1.0, -phi], kicks, axis=0)
         offset = G * (what.force_bias_g or math.radians(0.002)) * random.standard_normal(3)
         return np.concatenate([rate + constant + wander, force + offset], axis=1), cut, 25.0 + what.warm_up_c * warm
@@ -253,6 +256,8 @@ class SecondWorld:
         """Means of the frames that a driver finds in a cycle, how late it says they are (s), its error, their parts."""
         what, delay = self.what, 0.0
         if what.low_pass_hz:
+            from scipy.signal import butter, sosfilt, sosfilt_zi
+
             sections = butter(2, what.low_pass_hz, fs=HERTZ, output="sos")
             start = sosfilt_zi(sections)[:, :, None] * values[0]
             values = sosfilt(sections, values, axis=0, zi=start)[0]

@@ -17,6 +17,8 @@ from groundstation.service.answers.shapes.adjustment_shapes import (
 )
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.hole.examined_hole import ExaminedHole, std_across
+from groundstation.service.setup.setup_priors import north_std
+from groundstation.service.setup.toe_costs import TURN_MOST
 from groundstation.survey.adjustment.blunders import Blunder
 from groundstation.survey.adjustment.tube_biases import bias_of_tube
 
@@ -36,9 +38,10 @@ def answer_adjustment(k: RigModel, _p: Parameters) -> AdjustmentAnswer:
         redundancy=found.redundancy,
         misfit=examined.examination.global_ratio,
         play_deg=math.degrees(math.sqrt(found.now.play_var)),
-        sigma_toe_cm=100.0 * std_across(np.sum([share.variances for share in examined.shares], axis=0)),
+        sigma_toe_cm=100.0
+        * math.hypot(std_across(np.sum([share.variances for share in examined.shares], axis=0)), north_at_toe(k)),
         blunders=[blunder_row(examined, one) for one in examined.examination.blunders],
-        toe=toe_shares(examined),
+        toe=toe_shares(k, examined),
         tubes=[adjusted_tube(examined, place) for place in range(len(examined.tubes))],
         next_stop=next_stop_advice(examined),
     )
@@ -61,9 +64,15 @@ def blunder_row(examined: ExaminedHole, blunder: Blunder) -> BlunderRow:
     )
 
 
-def toe_shares(examined: ExaminedHole) -> list[ToeShare]:
+def north_at_toe(k: RigModel) -> float:
+    """Standard deviation (m) at the toe by the encoder's zero against north, which is in no look."""
+    return float(np.hypot(*k.hole.trajectory.positions[-1, :2])) * min(north_std(k.setup), TURN_MOST)
+
+
+def toe_shares(k: RigModel, examined: ExaminedHole) -> list[ToeShare]:
     """What each source gives at the toe, the worst first."""
-    shares = [ToeShare(*examined.share_name(one), 100.0 * std_across(one.variances)) for one in examined.shares]
+    shares = [ToeShare("north", "", 100.0 * north_at_toe(k))]
+    shares += [ToeShare(*examined.share_name(one), 100.0 * std_across(one.variances)) for one in examined.shares]
     return sorted((one for one in shares if one.sigma_cm > LEAST_SHOWN_CM), key=lambda one: -one.sigma_cm)
 
 

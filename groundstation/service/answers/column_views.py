@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from groundstation.errors import SelectorError
 from groundstation.service.answers.answer_table import LONGEST_NUMBER
 from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
+from groundstation.service.answers.shapes.answer_fields import filled_answers
 from groundstation.service.answers.shapes.column_shapes import (
     ColumnAnswer,
     ColumnDeviation,
@@ -21,7 +23,7 @@ from groundstation.service.answers.shapes.column_shapes import (
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.answers.thinning import FEWEST, largest_triangles
 from groundstation.service.hole.history import History, Moment
-from groundstation.survey.wall.column_deviation import Deviation, lateral_errors
+from groundstation.survey.wall.column_deviation import Deviation, lateral_errors, used_share
 
 POINTS, MOST_POINTS = 200, 1000  # of the history
 SHOWN = 30  # numbers that a refusal names
@@ -61,20 +63,21 @@ def answer_history(k: RigModel, p: Parameters) -> HistoryAnswer:
     if len(moments) > points:
         used = np.array([moment.about.ratio for moment in moments])
         moments = [moments[place] for place in largest_triangles(np.arange(len(used), dtype=float), used, points)]
-    return HistoryAnswer([history_moment(moment) for moment in moments])
+    return HistoryAnswer(filled_answers(HistoryMoment, map(moment_values, moments)))
 
 
-def history_moment(moment: Moment) -> HistoryMoment:
+def moment_values(moment: Moment) -> dict[str, Any]:
     """One moment of the history."""
     about = moment.about
-    return HistoryMoment(
-        moment=moment.number,
-        at_s=moment.at,
-        md_m=round(moment.deepest, 6),
-        deviation_cm=CM * about.size,
-        limit_cm=CM * about.limit,
-        used_percent=100.0 * about.ratio,
-    )
+    size = about.size
+    return {
+        "moment": moment.number,
+        "at_s": moment.at,
+        "md_m": round(moment.deepest, 6),
+        "deviation_cm": CM * size,
+        "limit_cm": CM * about.limit,
+        "used_percent": 100.0 * used_share(size, about.limit),
+    }
 
 
 def _moment(history: History, text: str) -> Moment:
@@ -103,16 +106,17 @@ def _dominant(k: RigModel) -> DominantAngle | None:
 
 def column_deviation(d: Deviation) -> ColumnDeviation:
     """One deviation."""
+    size, (north, east) = d.size, d.offset.tolist()
     return ColumnDeviation(
         md_m=round(d.md, 6),
         along_m=d.along,
-        north_cm=CM * float(d.offset[0]),
-        east_cm=CM * float(d.offset[1]),
-        deviation_cm=CM * d.size,
+        north_cm=CM * north,
+        east_cm=CM * east,
+        deviation_cm=CM * size,
         sigma_cm=CM * d.std,
-        deviation_percent=100.0 * d.size / d.along if d.along > 0.0 else 0.0,
-        direction_deg=math.degrees(math.atan2(d.offset[1], d.offset[0])) % 360.0,
+        deviation_percent=100.0 * size / d.along if d.along > 0.0 else 0.0,
+        direction_deg=math.degrees(math.atan2(east, north)) % 360.0,
         limit_cm=CM * d.limit,
-        used_percent=100.0 * d.ratio,
+        used_percent=100.0 * used_share(size, d.limit),
         level_percent=round(100.0 * d.level),
     )

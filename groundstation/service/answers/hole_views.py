@@ -43,8 +43,11 @@ SOURCES = ("random", *KIND_NAMES)
 @view_of(StationsAnswer)
 def answer_stations(k: RigModel, p: Parameters) -> StationsAnswer:
     """All stations, fused; ``md`` selects."""
-    wanted = SelectorRange.of_parameter("md", p)
-    return StationsAnswer(station_rows(k, [n for n, s in enumerate(k.hole.stations, 1) if wanted.holds(s.md)]))
+    numbers: Sequence[int] = range(1, len(k.hole.stations) + 1)
+    if "md" in p:
+        wanted = SelectorRange.parse("md", p["md"])
+        numbers = [n for n in numbers if wanted.holds(k.hole.stations[n - 1].md)]
+    return StationsAnswer(station_rows(k, numbers))
 
 
 @member_view_of(Station, lambda k: range(1, len(k.hole.stations) + 1))

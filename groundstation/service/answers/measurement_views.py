@@ -7,13 +7,14 @@ column by column, and no survey becomes an object on the way.
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
-from groundstation.service.answers.answer_texts import json_of, listed_texts
+from groundstation.service.answers.answer_texts import text_with_rows
 from groundstation.service.answers.answer_views import member_view_of, view_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.row_texts import Numbers
@@ -32,7 +33,6 @@ from groundstation.survey.fusion.survey_trust import Trust
 from telemetry.messages import NodeFlag
 
 DEGREES = 180.0 / math.pi  # in a radian
-NO_ROWS: Final = np.empty(0, np.int64)
 
 
 def answer_measurements_text(k: RigModel, p: Parameters) -> bytes:
@@ -47,7 +47,7 @@ def answer_measurements_text(k: RigModel, p: Parameters) -> bytes:
         return measurement_rows(surveys, rows[places].tolist(), stations[places].tolist())
 
     texts = k.texts.measurements.texts_of(rows, np.stack([surveys.column("number")[rows], stations], axis=1), render)
-    return json_of(MeasurementsAnswer(newest, listed_texts(texts)))
+    return text_with_rows(MeasurementsAnswer(newest, []), texts)
 
 
 @view_of(MeasurementsAnswer, answer_measurements_text)
@@ -61,7 +61,7 @@ def answer_measurements(k: RigModel, p: Parameters) -> MeasurementsAnswer:
 @member_view_of(StationMeasurementsAnswer, lambda k: range(1, len(k.hole.stations) + 1))
 def answer_station_measurements(k: RigModel, n: int) -> StationMeasurementsAnswer:
     """Every cluster of one station."""
-    surveys, rows = k.hole.stops, k.hole.stations[n - 1].stops.table_rows.tolist()
+    surveys, rows = k.hole.stops, k.hole.stations[n - 1].stops.rows.tolist()
     return StationMeasurementsAnswer(n, measurement_rows(surveys, rows, [n] * len(rows)))
 
 
@@ -69,10 +69,13 @@ def _selected(k: RigModel, p: Parameters) -> tuple[Numbers, Numbers]:
     """Rows (n,) of the table that the parameters select, and the numbers of their stations."""
     known, table, newest = k.hole.stations, k.hole.stops, k.hole.newest
     since, limit = window_limits(newest, p) if is_streamed(p) else (0, None)
-    by_station = SelectorRange.of_parameter("station", p)
-    chosen = [(n, one) for n, one in enumerate(known, 1) if by_station.holds(n)]
-    rows = np.concatenate([NO_ROWS, *(one.stops.table_rows for _, one in chosen)])
-    stations = np.repeat([n for n, _ in chosen], [one.count for _, one in chosen]).astype(np.int64)
+    chosen: Sequence[int] = range(1, len(known) + 1)
+    if "station" in p:
+        by_station = SelectorRange.parse("station", p["station"])
+        chosen = [n for n in chosen if by_station.holds(n)]
+    own = [known[n - 1].stops.rows for n in chosen]
+    rows = np.fromiter(itertools.chain.from_iterable(own), np.int64)
+    stations = np.repeat(np.array(chosen, np.int64), [len(one) for one in own])
     keeps = table.column("number")[rows] > since
     if "tube" in p:
         by_tube = SelectorRange.parse("tube", p["tube"])

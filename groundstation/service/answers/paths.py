@@ -73,7 +73,7 @@ class AnsweredPath:
             text = k.texts.text_of(self.answer.path, lambda: json_of(self.view(k, p)))
         else:
             text = json_of(self.view(k, p))
-        return json_of(answer_header(k))[:-1] + b"," + text[1:]
+        return b"".join((json_of(answer_header(k))[:-1], b",", memoryview(text)[1:]))
 
     def view(self, k: RigModel, p: Parameters) -> Any:
         """What stands behind the header."""

@@ -9,12 +9,12 @@ from collections.abc import Mapping
 
 from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
+from groundstation.service.answers.setup_costs import setup_costs
 from groundstation.service.answers.shapes.setup_shapes import SetupAnswer, SetupRow
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.setup.readiness import next_step
 from groundstation.service.setup.setup_items import ALONG, SetupItem, missing_names, setup_items
-from groundstation.service.setup.setup_priors import setup_priors
-from groundstation.service.setup.toe_costs import designed_course, toe_costs
+from groundstation.service.setup.toe_costs import designed_course
 
 SHOWN_UNITS = {"rad": "deg", "rad/s": "deg/s", "rad/m": "deg/m"}  # what people read in place of a unit
 LEFT_OUT = "random noise of the readings, and blunders that are not found"
@@ -26,7 +26,7 @@ def answer_setup(k: RigModel, _p: Parameters) -> SetupAnswer:
     items, trajectory = setup_items(k.config, k.setup, k.string), k.hole.trajectory
     is_surveyed = len(trajectory) > 1
     course = trajectory if is_surveyed else designed_course(k.config.design, k.config.tube_length)
-    costs = toe_costs(setup_priors(items, k.setup.version), course)
+    costs = setup_costs(k, items, course)
     missing = missing_names(items)
     # a column is judged across its axis: what is wrong of the depth comes after all else
     ordered = sorted(items, key=lambda item: (not item.is_missing, item.kind in ALONG, -costs[item.name]))

@@ -89,7 +89,8 @@ class HoleAdjustment:
         hung = np.array([hanging.add_chain(chain) for chain in chains], np.intp)[which]
         newest = dict(zip(which.tolist(), seen["systematic_var"].tolist(), strict=True))
         variances = [newest[place] for place in range(len(chains))]
-        causes = causes_of_turns(hanging, chains, variances, math.radians(self._config.mount_std_deg) ** 2)
+        mount_var = math.radians(self._config.mount_std_deg) ** 2
+        causes = causes_of_turns(hanging, chains, variances, mount_var)
         tube_of, make_up = np.ascontiguousarray(hung[:, 0]), np.ascontiguousarray(hung[:, 1])
         unknown = UNKNOWN_YAW_VAR * (seen["trust"] == Trust.UNKNOWN_YAW)
         stop, force = stop_numbers(seen["at"]), np.ascontiguousarray(seen["force"])
@@ -165,14 +166,18 @@ def noise_of(seen: Rows, tube_of: Places) -> Array:
     return np.where(own > LOUD * usual, own, OWN_SHARE * own + (1.0 - OWN_SHARE) * usual)
 
 
-def directions_of(adjusted: Adjusted, shared: SharedErrors) -> list[SphereDirection]:
-    """Directions of the stations below the collar, from the top down."""
-    bases = adjusted.bases[1:]
+def directions_of(adjusted: Adjusted, shared: SharedErrors, north_std: float) -> list[SphereDirection]:
+    """Directions of the stations below the collar, from the top down.
+
+    The encoder's zero against north (rad) turns them all about the vertical and is in no look: it is one more column.
+    """
+    bases, tangents = adjusted.bases[1:], adjusted.now.tangents[1:]
     own = np.swapaxes(bases, 1, 2) @ adjusted.own_covs[1:, :2, :2] @ bases
-    columns = np.swapaxes(bases, 1, 2) @ adjusted.columns[1:, :2]
+    turned = north_std * np.stack([-tangents[:, 1], tangents[:, 0], np.zeros(len(tangents))], axis=1)
+    columns = np.concatenate([np.swapaxes(bases, 1, 2) @ adjusted.columns[1:, :2], turned[:, :, None]], axis=2)
     places = shared.adjusted_places(columns.shape[2])
     width = shared.count
     found = []
-    for tangent, cov, values in zip(adjusted.now.tangents[1:], own, columns, strict=True):
+    for tangent, cov, values in zip(tangents, own, columns, strict=True):
         found.append(SphereDirection(tangent, cov, Packed.of_values(values, places, width)))
     return found

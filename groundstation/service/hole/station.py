@@ -61,11 +61,6 @@ class StationStops:
         """Numbers of the stops at some places, side by side."""
         return self._table.rows[[self.rows[place] for place in places]]
 
-    @property
-    def table_rows(self) -> npt.NDArray[np.int64]:
-        """Rows (n,) of the table that hold the stops."""
-        return np.array(self.rows, np.int64)
-
     def insert_stop(self, other: ResolvedStops, row: int) -> int:
         """Insert a stop of another table in the order of time; returns its place."""
         place = self._place_behind(other, row)

@@ -24,7 +24,7 @@ from groundstation.service.hole.movement import Moved, Movement
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
 from groundstation.service.setup.setup_book import SetupBook
-from groundstation.service.setup.setup_priors import collar_direction
+from groundstation.service.setup.setup_priors import collar_direction, north_std
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import SharedErrors
@@ -230,7 +230,7 @@ class SurveyedHole:
     def _adjust(self) -> list[SurveyStation]:
         """Adjust the hole; all of its stations have changed."""
         self._touched, examined = {}, self.examined
-        found = [] if examined is None else directions_of(examined.adjusted, self._shared)
+        found = [] if examined is None else directions_of(examined.adjusted, self._shared, north_std(self._setup))
         self._adjusted = dict(zip([one.md for one in self._below], found, strict=True))
         return self._below
 

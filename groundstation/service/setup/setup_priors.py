@@ -13,6 +13,7 @@ from groundstation.service.setup.setup_book import SetupBook
 from groundstation.service.setup.setup_items import COLLAR_STD, SetupItem
 from groundstation.service.setup.told_value import SetupKind
 from groundstation.survey.fusion.resolve import Direction, known_direction
+from telemetry.messages import UNKNOWN_YAW_STD
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +45,12 @@ def setup_priors(items: Iterable[SetupItem], version: int = 0) -> SetupPriors:
     """Priors of all items of a setup."""
     by_name = {one.name: SetupPrior(one.kind, one.subject, one.values, one.sigma, one.is_told) for one in items}
     return SetupPriors(version, by_name)
+
+
+def north_std(book: SetupBook) -> float:
+    """Standard deviation (rad) of the encoder's zero against north; of one that was not told any azimuth may be."""
+    told = book.standing(SetupKind.NORTH)
+    return UNKNOWN_YAW_STD if told is None else told.sigma
 
 
 def collar_direction(config: GroundConfig, book: SetupBook) -> Direction:

@@ -9,7 +9,7 @@ from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks, PathPrio
 
 Array = npt.NDArray[np.float64]
 Truths = npt.NDArray[np.bool_]
-KNOWN_TURN = 0.3  # rad, standard deviation of a turn up to which it is used as it is told
+KNOWN_TURN = 0.3  # rad, standard deviation of a turn beside that of the best up to which it is used as it is told
 
 
 def first_start(looks: Looks, string: StringPrior, path: PathPrior) -> StartingPoint:
@@ -19,7 +19,7 @@ def first_start(looks: Looks, string: StringPrior, path: PathPrior) -> StartingP
     """
     turns = string.turn.copy()
     vars_of_looks = _vars_of_turns(looks, string)
-    is_known = vars_of_looks <= max(KNOWN_TURN**2, 1.000001 * float(vars_of_looks.min(initial=np.inf)))
+    is_known = vars_of_looks <= KNOWN_TURN**2 + float(vars_of_looks.min(initial=np.inf))
     tangents = _mean_directions(looks, looks.yaw - _turns(looks, string, turns), path, is_known.astype(np.float64))
     if not is_known.all():
         seen_there = np.bincount(looks.station[is_known], minlength=len(path.md)) > 0

@@ -133,20 +133,27 @@ class Deviation:
     @property
     def std(self) -> float:
         """Standard deviation (m) of the distance, along the offset (of the worst direction without one)."""
-        if self.size < 1e-9:
+        size = self.size
+        if size < 1e-9:
             return math.sqrt(max(float(np.linalg.eigvalsh(self.cov)[-1]), 0.0))
-        unit = self.offset / self.size
+        unit = self.offset / size
         return math.sqrt(max(float(unit @ self.cov @ unit), 0.0))
 
     @property
     def ratio(self) -> float:
         """Share of the tolerance that is used up."""
-        return self.size / self.limit if self.limit > 0.0 else (math.inf if self.size > 0.0 else 0.0)
+        return used_share(self.size, self.limit)
 
     @property
     def level(self) -> float:
         """Highest alarm level reached, 0 for none."""
-        return max((level for level in LEVELS if self.ratio >= level), default=0.0)
+        ratio = self.ratio
+        return max((level for level in LEVELS if ratio >= level), default=0.0)
+
+
+def used_share(size: float, limit: float) -> float:
+    """Share of a tolerance of ``limit`` (m) that a deviation of ``size`` (m) uses up."""
+    return size / limit if limit > 0.0 else (math.inf if size > 0.0 else 0.0)
 
 
 @dataclass(frozen=True, slots=True)

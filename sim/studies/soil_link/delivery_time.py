@@ -14,8 +14,6 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import fftconvolve
-from scipy.stats import gamma
 
 from telemetry.transport.hop import FIRST_TIMEOUT, LAST_TIMEOUT
 
@@ -69,6 +67,8 @@ def joint_delay(joint: LossyJoint) -> Array:
 
 def message_delay(joints: Sequence[LossyJoint]) -> Array:
     """Distribution (CELLS,) of the time over joints that are independent of each other and jitter alike."""
+    from scipy.signal import fftconvolve  # a second, which only the study pays
+
     total = jitter_distribution(len(joints), joints[0].jitter)
     for joint in joints:
         total = fftconvolve(total, joint_delay(joint))[:CELLS]
@@ -79,6 +79,8 @@ def jitter_distribution(joints: int, mean: float) -> Array:
     """Distribution (CELLS,) of the sum of as many exponentials, each to the nearest step."""
     if mean <= 0.0:
         return np.asarray(np.arange(CELLS) == 0, float)
+    from scipy.stats import gamma
+
     edges = (np.arange(CELLS + 1) - 0.5) * STEP
     return np.asarray(np.diff(gamma.cdf(edges, joints, scale=mean)))
 

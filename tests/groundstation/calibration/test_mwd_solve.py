@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import least_squares
 
 from groundstation.calibration.mwd_cost import Problem
 from groundstation.calibration.mwd_design import parameter_covariance, refuse_open
@@ -141,6 +140,8 @@ def test_control_fails_before_and_passes_after(outcomes: dict, heating: Heating)
 @pytest.mark.parametrize("tools", [1, pytest.param(FEW, marks=pytest.mark.statistical)])
 @pytest.mark.parametrize("heating", [*DESIGNS, Heating.SINGLE_RAMP])
 def test_an_independent_solver_ends_in_the_same_minimum(heating: Heating, tools: int) -> None:
+    from scipy.optimize import least_squares
+
     for seed in range(1, tools + 1):
         problem = problem_of(heating, seed)
         free = free_parameter_matrix(12 if problem.powers == 1 else 30, "ABC")

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import chi2
 
 from groundstation.errors import SurveyError
 from groundstation.survey.well.ellipsoid import (
@@ -29,6 +28,8 @@ def covariance(entries: list[float], size: int = 3) -> np.ndarray:
 @pytest.mark.parametrize("dimensions", [1, 2, 3])
 @pytest.mark.parametrize("probability", [1e-6, 1e-3, 0.1, 0.3934693402873666, 0.5, 0.68, 0.9, 0.95, 0.99, 0.9999999])
 def test_the_radius_is_the_root_of_the_chi_square_quantile(probability: float, dimensions: int) -> None:
+    from scipy.stats import chi2  # half a second, for those who need it
+
     expected = math.sqrt(chi2.ppf(probability, dimensions))
     assert coverage_radius(probability, dimensions) == pytest.approx(expected, rel=1e-8)
 
@@ -41,6 +42,8 @@ def test_the_radii_that_everybody_quotes() -> None:
 
 @given(st.floats(0.0, 8.0), st.sampled_from([1, 2, 3]))
 def test_the_probability_is_that_of_the_chi_square(sigma: float, dimensions: int) -> None:
+    from scipy.stats import chi2
+
     assert probability_of(sigma, dimensions) == pytest.approx(chi2.cdf(sigma**2, dimensions), abs=1e-14)
 
 

@@ -1,23 +1,12 @@
 """Regions of uncertainty: the printed examples, an independent library, sampling, and hand-worked wells."""
 
 import math
-import warnings
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, Term, load_tool, shipped_tool_names
-from groundstation.survey.well.error_propagation import Uncertainty, propagate_errors
-from groundstation.survey.well.error_sources import RECORD, Leg, Site, WellSurvey
-from groundstation.survey.well.leg_errors import covariance_at
-from groundstation.survey.well.methods import Method, station_positions
-
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")
-    import welleng.survey
 from wells import (
     DEG,
     MWD,
@@ -25,12 +14,19 @@ from wells import (
     WELLS,
     angle_term,
     hand_well,
+    import_welleng,
     largest_difference,
     random_well,
     survey_of,
     tool_of,
     well_of,
 )
+
+from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, Term, load_tool, shipped_tool_names
+from groundstation.survey.well.error_propagation import Uncertainty, propagate_errors
+from groundstation.survey.well.error_sources import RECORD, Leg, Site, WellSurvey
+from groundstation.survey.well.leg_errors import covariance_at
+from groundstation.survey.well.methods import Method, station_positions
 
 
 def test_the_accelerometer_example_has_its_printed_digits() -> None:
@@ -70,6 +66,7 @@ def test_a_survey_without_times_takes_a_hundred_seconds_for_a_rod_of_two_metres(
 @pytest.mark.slow
 def test_every_source_of_the_mwd_model_agrees_with_the_independent_library() -> None:
     rng = np.random.default_rng(10)
+    welleng = import_welleng()
     header = welleng.survey.SurveyHeader(
         latitude=60, longitude=2, altitude=0, b_total=50_000, dip=72, declination=3, convergence=0, G=9.80665,
         azi_reference="true",

@@ -3,7 +3,7 @@
 import datetime
 import json
 import math
-import warnings
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
+from wells import import_welleng
 
 from groundstation.errors import ToolError
 from groundstation.survey.tools.instruments import (
@@ -28,11 +29,10 @@ from groundstation.survey.well.error_propagation import propagate_errors
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
 from groundstation.survey.well.methods import Method, station_positions
 
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")
-    import welleng.survey
-
-PUBLISHED = Path(welleng.__file__).parent / "errors"
+WELLENG = find_spec("welleng")  # found, not imported
+assert WELLENG is not None
+assert WELLENG.origin is not None
+PUBLISHED = Path(WELLENG.origin).parent / "errors"
 FILES = sorted((PUBLISHED / "iscwsa_json" / "owsg_a").glob("*.json"))
 # Free gyros whose files leave out how fast they run
 NEEDING = {"CB_Film_GMS", "CB_Film_GSS"}
@@ -96,6 +96,7 @@ def test_published_models_give_the_regions_their_publisher_computes(path: Path) 
     assert [term.name for term in tool.terms] == [entry["name"] for entry in model["terms"]]
     # the publisher's limit excludes the limit itself
     md, inclination, azimuth = well(min(60.0, 0.95 * math.degrees(tool.inclination_range[1])))
+    welleng = import_welleng()
     header = welleng.survey.SurveyHeader(
         latitude=60, longitude=2, altitude=0, b_total=50_000, dip=72, declination=3, convergence=0, G=9.80665,
         azi_reference="true",

@@ -1,18 +1,14 @@
 """Trajectory methods against two published libraries."""
 
 import math
-import warnings
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
 import wellpathpy
+from wells import import_welleng
 
 from groundstation.survey.well.methods import Method, dogleg_severity, station_positions
-
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")
-    import welleng.survey
 
 WELLS = 200
 Well = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -83,6 +79,7 @@ def test_minimum_curvature_agrees_with_welleng_across_north_too() -> None:
     rng = np.random.default_rng(21)
     for md, inclination, azimuth in random_wells():
         across = np.mod(azimuth + rng.uniform(0.0, 360.0), 360.0)
+        welleng = import_welleng()
         header = welleng.survey.SurveyHeader(b_total=50_000, dip=70, declination=0, convergence=0)
         theirs = welleng.survey.Survey(md, inclination, across, header=header)
         ours = station_positions(Method.MINIMUM_CURVATURE, md, np.radians(inclination), np.radians(across))

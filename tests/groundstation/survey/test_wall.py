@@ -9,7 +9,6 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.special import ndtr
-from scipy.stats import ncx2
 
 from groundstation.errors import SurveyError
 from groundstation.survey.wall.as_built import Columns, Cut, intersect_planes
@@ -102,6 +101,8 @@ def test_a_joint_that_columns_never_make_is_refused(required: float) -> None:
 @pytest.mark.parametrize("std", [0.0009, 0.003, 0.01, 0.03, 0.1, 0.5, 3.0])
 @pytest.mark.parametrize("direction", [0.0, 0.05, 0.3, 0.25 * math.pi, 1.53, 2.5, -3.1])
 def test_alike_in_all_directions_the_probability_is_the_noncentral_chi(std: float, direction: float) -> None:
+    from scipy.stats import ncx2  # half a second, for those who need it
+
     checked = 0
     for distance in [*np.linspace(0.0, 1.2, 13), *(LIMIT + std * np.linspace(-6.5, 3.0, 20))]:
         expected = float(ncx2.sf((LIMIT / std) ** 2, 2, (distance / std) ** 2))
@@ -331,6 +332,8 @@ def test_a_joint_opens_where_the_column_has_used_up_the_margin() -> None:
 
 
 def test_both_regions_of_uncertainty_count_towards_a_joint() -> None:
+    from scipy.stats import ncx2
+
     columns, pairs = wall(0.0)
     found = judge_joints(columns, pairs, REQUIRED)
     std = math.sqrt(2.0) * (3e-4 * 30.0 + 1e-4)
