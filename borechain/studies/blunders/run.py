@@ -56,7 +56,7 @@ def count_steps(seeds: int, honest: int) -> int:
 def run_study(seeds: int, honest: int, step: Step) -> dict[str, Any]:
     """A row for each kind and size, and one of honest rigs; ``step`` is called after each rig."""
     places = [(kind, size) for kind in range(len(KINDS)) for size in range(len(KINDS[kind].sizes))]
-    with over_cores(seeds, step) as run_all:
+    with over_cores(max(seeds, honest), step) as run_all:
         of_honest = run_all(run_rig, [BlunderJob(draw) for draw in drawn_rigs(USUAL, honest)])
         rows = []
         for kind, size in places:

@@ -95,7 +95,7 @@ def run_study(seeds: int, rigs: int, step: Step) -> dict[str, Any]:
     dict
         ``cases``: a row a station; ``sketch``: a row of the second table; ``traces``: what the figure shows.
     """
-    with over_cores(seeds, step) as run_all:
+    with over_cores(max(seeds, rigs), step) as run_all:
         runs = run_all(run_rig, drawn_rigs(USUAL, seeds))
         sketch = [sketch_row(case, run_sketch(run_all, case, rigs)) for case in sketch_cases()]
     stations = min(len(run.judged.md) for run in runs)
