@@ -55,18 +55,18 @@ class JudgedHole:
 
 
 def judge_hole_of(world: World, hole: SurveyedHole) -> JudgedHole:
-    """A hole at the end of a run beside the truth of its world."""
+    """A hole at the end of a run beside the truth of its world; without a station where nothing could be placed."""
     true_hole = world.scenario.hole if world.moved_hole is None else world.moved_hole.hole
     stations = [station for station in hole.stations if station.md > 0.0]
-    depths = np.array([true_depth(world, station) for station in stations])
+    depths = np.array([true_depth(world, station) for station in stations], np.float64)
     directions = [hole.direction_of(station) for station in stations]
     places = [hole.place_of(station) for station in stations]
-    lean = np.array([one.lean for one in directions]) - true_hole.tangent(depths)[0][:, :2]
-    true_positions = np.array([true_hole.position(float(md)) for md in depths])
+    lean = np.reshape([one.lean for one in directions], (-1, 2)) - true_hole.tangent(depths)[0][:, :2]
+    true_positions = np.reshape([true_hole.position(float(md)) for md in depths], (-1, 3))
     return JudgedHole(
         np.array([station.md for station in stations]),
         lean,
-        np.array([one.total_cov for one in directions]),
+        np.reshape([one.total_cov for one in directions], (-1, 2, 2)),
         hole.trajectory.positions[places] - true_positions,
         hole.trajectory.covs[places],
     )

@@ -43,6 +43,7 @@ BLUNDERS: Columns = (
     ("missed", "beyond, without a word"),
     ("beyond_on_target", "beyond and ON TARGET"),
     ("worst_sigmas", "worst error, sigma"),
+    ("direction_sigmas", "of a direction"),
     ("toe_mm", "toe, mm"),
     ("causes", "named"),
 )

@@ -46,4 +46,4 @@ def test_rigs_are_drawn_by_their_number_and_have_every_kind_of_hole() -> None:
     ],
 )
 def test_an_outcome_is_what_the_crew_is_told(worst: float, answer: AnswerGiven, outcome: str) -> None:
-    assert outcome_of(BlunderRun(worst, 1.0, answer), ("mount",)) == outcome
+    assert outcome_of(BlunderRun(worst, 1.0, 1.0, answer), ("mount",)) == outcome

@@ -7,6 +7,7 @@ may not be ON TARGET without a word: that is ``missed``.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -41,9 +42,10 @@ class BlunderJob:
 
 @dataclass(frozen=True, slots=True)
 class BlunderRun:
-    """One rig: its worst error in standard deviations of what is stated, the toe's in mm, and the answer."""
+    """One rig: worst error of all and of a direction, in standard deviations stated; the toe's in mm; the answer."""
 
     worst: float
+    direction: float
     toe_mm: float
     answer: AnswerGiven
 
@@ -85,8 +87,9 @@ def run_rig(job: BlunderJob) -> BlunderRun:
         judged = judge_hole_of(world, ground.model.hole)
         # of a direction with two degrees of freedom and a position with three, as a normal number is beyond its sigma
         squares = np.concatenate([judged.direction_squares / 2.0, judged.ellipsoid_squares / 3.0])
-        toe = 1e3 * float(np.linalg.norm(judged.error[-1, :2]))
-        return BlunderRun(float(np.sqrt(squares.max())), toe, answer_of(ground))
+        toe = 1e3 * float(np.linalg.norm(judged.error[-1, :2])) if len(judged.md) else math.nan
+        direction = float(np.sqrt(0.5 * judged.direction_squares.max(initial=0.0)))
+        return BlunderRun(float(np.sqrt(squares.max(initial=0.0))), direction, toe, answer_of(ground))
 
 
 def outcome_of(run: BlunderRun, named: Sequence[str]) -> str:
@@ -110,7 +113,8 @@ def blunder_row(kind: PlantedBlunder, size: int, runs: Sequence[BlunderRun]) -> 
         **{name: counts[name] for name in ("named", "doubted", "below", "missed")},
         "beyond_on_target": on_target,
         "worst_sigmas": float(np.median([run.worst for run in runs])),
-        "toe_mm": float(np.median([run.toe_mm for run in runs])),
+        "direction_sigmas": float(np.median([run.direction for run in runs])),
+        "toe_mm": float(np.nanmedian([run.toe_mm for run in runs])),
         "causes": most_common_causes(runs),
     }
 
@@ -128,7 +132,8 @@ def honest_row(runs: Sequence[BlunderRun]) -> dict[str, Any]:
         "missed": sum(not run.answer.is_doubted for run in beyond),
         "beyond_on_target": sum(run.answer.word == "on_target" for run in beyond),
         "worst_sigmas": float(np.median([run.worst for run in runs])),
-        "toe_mm": float(np.median([run.toe_mm for run in runs])),
+        "direction_sigmas": float(np.median([run.direction for run in runs])),
+        "toe_mm": float(np.nanmedian([run.toe_mm for run in runs])),
         "causes": most_common_causes(runs),
     }
 
