@@ -10,13 +10,17 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from pydantic_core import PydanticCustomError
 
 from groundstation.errors import ConfigurationError
+from groundstation.plan_settings import PlanSettings
 from groundstation.survey.fusion.fusion import Weighting
+from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.wall.column_deviation import PRESETS, ColumnDesign
+from groundstation.survey.well.depth_errors import DepthErrors
 from telemetry import keys
 
 SENSOR_BIAS_DEG = 0.06  # of an uncalibrated accelerometer, as a tilt: 1 mg
 Positive = Annotated[float, Field(gt=0.0)]
 Joint = Annotated[str, Field(pattern=r"^([1-9][0-9]{0,2}|drive)-[1-9][0-9]{0,2}$")]  # upper tube and lower, such as 4-3
+NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class GroundConfig(BaseModel):
@@ -30,6 +34,10 @@ class GroundConfig(BaseModel):
     key_file: Path | None = Field(None, description="key of the rig; without one no parameter block is uploaded")
     keys: Path | None = Field(None, description="keys of the base, file or folder; without them everybody is believed")
     tube_length: Positive = Field(2.0, description="m, of every tube of the tally")
+    tube_length_std: NotNegative = Field(1e-3, description="m, of the length of each tube")
+    depth_scale_std: NotNegative = Field(5.6e-4, description="m/m, of the depth of the bit")
+    depth_offset_std: NotNegative = Field(0.01, description="m, of the stick-up")
+    depth_reading_std: NotNegative = Field(2e-3, description="m, of each reading of the depth")
     gravity: Positive = Field(9.81, description="m/s^2, of the site")
     accelerometer_bias_std_deg: float = Field(
         SENSOR_BIAS_DEG, ge=0.0, description="as a tilt; 0.002 where every sensor is calibrated"
@@ -62,6 +70,7 @@ class GroundConfig(BaseModel):
     target: Positive = Field(30.0, description="m, length of the design axis")
     design_inclination_deg: float = Field(0.0, ge=0.0, le=180.0)
     design_azimuth_deg: float = 0.0
+    plan: PlanSettings | None = Field(None, description="course of the design, in place of the straight axis")
     column_radius: Positive = Field(0.6, description="m, of the finished column")
     tolerance: Literal["en-12716", "5-cm", "0.27-deg"] = Field("en-12716", description="preset of columns.PRESETS")
     steering_deg_per_m: Positive = Field(0.5, description="the most by which the rig bends a hole back")
@@ -97,15 +106,35 @@ class GroundConfig(BaseModel):
         return self
 
     @property
+    def depth_errors(self) -> DepthErrors:
+        """Errors of measured depths."""
+        return DepthErrors(self.depth_scale_std, self.depth_offset_std, self.tube_length_std, self.depth_reading_std)
+
+    @property
+    def wander(self) -> LegWander:
+        """Curvature of the path between the stations."""
+        return LegWander(math.radians(self.curvature_std_deg_per_m), self.curvature_length)
+
+    @property
     def design(self) -> ColumnDesign:
-        """Axis of the column."""
+        """Axis of the column.
+
+        Raises
+        ------
+        SurveyError
+            When its plan is none.
+        """
+        allowed, plan = PRESETS[self.tolerance], self.plan
+        if plan is not None:
+            allowed = plan.to_tolerance(allowed)
+            return ColumnDesign.of_plan(self.rig, plan.to_plan(), plan.head, self.column_radius, allowed)
         return ColumnDesign(
             self.rig,
             inclination=math.radians(self.design_inclination_deg),
             azimuth=math.radians(self.design_azimuth_deg),
             length=self.target,
             radius=self.column_radius,
-            tolerance=PRESETS[self.tolerance],
+            tolerance=allowed,
         )
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from groundstation.page_options import PageRequest, page_options
+from groundstation.plan_settings import read_plan
 from telemetry.runtime.process_options import PlaceRequest, clock_option, key_option, keys_option, place_options
 from telemetry.runtime.typed_options import gather_options
 
@@ -25,6 +26,7 @@ class GroundRequest:
     target_m: float
     design_inclination_deg: float
     design_azimuth_deg: float
+    plan: Path | None
     column_radius_m: float
     tolerance: str
     steering_deg_per_m: float
@@ -46,12 +48,13 @@ class GroundRequest:
     database: str | None
 
     def to_settings(self) -> dict[str, Any]:
-        """Settings by the keys of ``GroundConfig``, which looks at their ranges."""
+        """Settings by the keys of ``GroundConfig``, which looks at their ranges; errors as ``read_plan``."""
         return {
             "tube_length": self.tube_length_m,
             "target": self.target_m,
             "design_inclination_deg": self.design_inclination_deg,
             "design_azimuth_deg": self.design_azimuth_deg,
+            "plan": None if self.plan is None else read_plan(self.plan),
             "column_radius": self.column_radius_m,
             "tolerance": self.tolerance,
             "steering_deg_per_m": self.steering_deg_per_m,
@@ -85,6 +88,11 @@ ground_options = gather_options(
         help="Of the design axis; 0 is vertical.",
     ),
     click.option("--design-azimuth-deg", type=float, default=0.0, show_default=True, help="Of the design axis."),
+    click.option(
+        "--plan",
+        type=click.Path(path_type=Path, dir_okay=False),
+        help="Course of the design in three dimensions, in place of a straight axis: legs (.toml) or stations (.csv).",
+    ),
     click.option(
         "--column-radius-m", type=POSITIVE, default=0.6, show_default=True, help="Radius of the finished column."
     ),

@@ -53,7 +53,8 @@ def _record(wall: Wall, judgement: Judgement, k: int) -> ColumnRecord:
     if count > 1:
         places = station_positions(wall.file.assumed.method, hole.md, hole.inclination, hole.azimuth)
         survey = WellSurvey(hole.md, hole.inclination, hole.azimuth, places[:, 2], hole.record)
-        covs = position_covariance(survey_errors(survey, plan.tool, wall.file.assumed))
+        told = hole.covs
+        covs = position_covariance(survey_errors(survey, plan.tool, wall.file.assumed)) if told is None else told
     covs = covs + plan.head_std**2 * np.diag([1.0, 1.0, 0.0])
     actions = [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings if name in f.what.split("-")]
     actions += remedy_lines(wall, judgement, k)

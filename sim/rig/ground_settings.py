@@ -27,7 +27,17 @@ def ground_settings(world: World) -> dict[str, Any]:
         "design_azimuth_deg": file.design.azimuth_deg,
         "column_radius": file.design.radius_m,
         "tolerance": file.design.tolerance,
-    } | (transport | told_settings(world))
+    } | (transport | told_settings(world) | plan_settings(world))
+
+
+def plan_settings(world: World) -> dict[str, Any]:
+    """What the operator enters where the design has legs."""
+    design = world.scenario.file.design
+    if not design.leg:
+        return {}
+    legs = [leg.model_dump(exclude_defaults=True) for leg in design.leg]
+    first = {"inclination_deg": design.inclination_deg, "azimuth_deg": design.azimuth_deg}
+    return {"plan": first | {"leg": legs}}
 
 
 def told_settings(world: World) -> dict[str, Any]:

@@ -131,6 +131,7 @@ UNUSED: Final[dict[str, str]] = {  # keys without effect on a campaign, and why
     "told.depth_std_m": GROUND,
     "told.depth_stuck_after_s": GROUND,
     "told.depth_stuck_s": GROUND,
+    "design.leg": GROUND,
     "site": "its hole is chosen before",
     "site.name": "its hole is chosen before",
     "site.radius_m": GROUND,

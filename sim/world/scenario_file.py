@@ -239,6 +239,16 @@ class NodeSection(ScenarioSection):
     )
 
 
+class PlanLegSection(ScenarioSection):
+    """One leg of the design: a length held, built or turned at even rates, or an arc to a direction."""
+
+    length_m: Positive | None = Field(None, description="what the rates and the direction to reach give, if absent")
+    build_deg_per_m: float = 0.0
+    turn_deg_per_m: float = 0.0
+    to_inclination_deg: float | None = Field(None, ge=0.0, le=180.0)
+    to_azimuth_deg: float | None = None
+
+
 class DesignSection(ScenarioSection):
     """The column that the hole is to become, as the ground station judges it."""
 
@@ -247,6 +257,7 @@ class DesignSection(ScenarioSection):
     length_m: Positive | None = Field(None, description="of the axis; what the tubes reach if absent")
     radius_m: Positive = Field(0.6, description="of the finished column")
     tolerance: Literal["en-12716", "5-cm", "0.27-deg"] = "en-12716"
+    leg: tuple[PlanLegSection, ...] = Field((), description="legs from the direction above, in place of one straight")
 
 
 class DriftSection(ScenarioSection):

@@ -2,10 +2,10 @@
 
 import csv
 import json
-import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hand_fed import Rig
 
@@ -13,7 +13,8 @@ from borechain.api import wall as judged_wall
 from groundstation.config import GroundConfig
 from groundstation.errors import SurveyError
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.wall_views import stations_of
+from groundstation.service.answers.wall_views import survey_of
+from groundstation.survey.wall.wall_columns import ColumnSurvey
 
 pytestmark = pytest.mark.slow
 
@@ -61,7 +62,9 @@ class Site:
     def keep(self, hole: str, model: RigModel) -> None:
         """Put the stations of a finished hole into the wall's file."""
         self.stations = [row for row in self.stations if row[0] != hole] + [(hole, 0.0, 0.0, 0.0)]
-        self.stations += [(hole, md, math.degrees(i), math.degrees(a)) for md, i, a in stations_of(model)]
+        found = survey_of(model)
+        rows = zip(found.md, np.degrees(found.inclination), np.degrees(found.azimuth), strict=True)
+        self.stations += [(hole, float(md), float(i), float(a)) for md, i, a in rows if md > 0.0]
         self._write()
 
 
@@ -78,7 +81,7 @@ def test_a_joint_closes_from_the_top_down_while_the_third_hole_is_drilled(site: 
     site.drill("H1", 0.05)
     site.drill("H2", 0.05)
     shown = site.drill("H3", 0.05)
-    rows = [joints(one)["H3-H2"] for one in shown]
+    rows = [joints(one)["H2-H3"] for one in shown]
     assert [row["state"] for row in rows] == ["missing"] * STOPS + ["surveyed"]
     surveyed = [row["surveyed_percent"] for row in rows]
     assert surveyed == sorted(surveyed)
@@ -93,24 +96,24 @@ def test_a_hole_that_leans_off_opens_its_joint_and_a_column_is_proposed(site: Si
     site.drill("H1", 0.0)
     site.drill("H2", 0.0)
     shown = site.drill("H3", 5.0)
-    chances = [joints(one)["H3-H2"]["probability_where_surveyed"] for one in shown[1:]]
+    chances = [joints(one)["H2-H3"]["probability_where_surveyed"] for one in shown[1:]]
     assert chances == sorted(chances)
     assert chances[0] < 0.01 < 0.99 < chances[-1]
     assert shown[-1]["verdict"] == "not_tight"
-    assert any("H3-H2" in text for text in shown[-1]["findings"])
-    assert [extra["joint"] for extra in shown[-1]["extra_columns"]] == ["H3-H2"]
-    assert joints(shown[-1])["H3-H2"]["thickness_m"] < shown[-1]["required_thickness_m"]
+    assert any("H2-H3" in text for text in shown[-1]["findings"])
+    assert [extra["joint"] for extra in shown[-1]["extra_columns"]] == ["H2-H3"]
+    assert joints(shown[-1])["H2-H3"]["thickness_m"] < shown[-1]["required_thickness_m"]
 
 
 def test_the_last_word_is_that_of_the_wall_command(site: Site) -> None:
     site.drill("H1", 0.05)
     site.drill("H3", 0.1)
     live = joints(site.drill("H2", 0.4)[-1])
-    assert set(live) == {"H2-H1", "H2-H3"}
+    assert set(live) == {"H1-H2", "H2-H3"}
     afterwards = judged_wall(site.file)
     for pair, thickness in zip(afterwards.joints.pairs, afterwards.joints.thickness, strict=True):
         names = {afterwards.wall.plans[k].design.name for k in pair}
-        row = next(row for name, row in live.items() if set(name.split("-")) == names)
+        row = live["-".join(sorted(names))]
         assert row["thickness_m"] == pytest.approx(float(min(thickness)), abs=2e-4)
 
 
@@ -132,7 +135,8 @@ def test_a_wall_that_contradicts_itself_is_told_and_answers_go_on(site: Site) ->
     site.drill("H1", 0.0)
     model = RigModel.begin(GroundConfig(folder=site.folder / "x", wall=site.file, hole="H2"))
     assert model.wall is not None
-    broken = model.wall.judged([(2.0, 1.5, 0.0), (4.0, 1.6, 0.0)], 4.0)
+    bent = ColumnSurvey(np.array([0.0, 2.0, 4.0]), np.array([0.0, 1.5, 1.6]), np.zeros(3))
+    broken = model.wall.judged(bent, 4.0)
     assert broken.judgement is None
     assert broken.problem
     json.dumps(broken.problem)

@@ -274,7 +274,7 @@ def test_uncertainty_is_told_at_a_confidence_with_its_sources(tmp_path: Path) ->
         for axis, name in enumerate(("sigma_north_m", "sigma_east_m", "sigma_tvd_m")):
             squares = sum(source[name] ** 2 for source in sources.values())
             assert squares == pytest.approx(point.cov[axis, axis], rel=1e-6, abs=1e-15)
-    assert set(view["stations"][-1]["sources"]) == {"random", "mounts", "joints", "accelerometer_bias"}
+    assert set(view["stations"][-1]["sources"]) == {"random", "mounts", "joints", "accelerometer_bias", "depth", "path"}
 
 
 def test_another_confidence_scales_the_regions(tmp_path: Path) -> None:
@@ -303,6 +303,9 @@ def test_views_of_nothing_have_the_collar_alone(tmp_path: Path) -> None:
     assert (alarms["active"], alarms["cleared"], alarms["moved"]) == ([], [], [])
 
 
+FIRST_LEG = 2.0 / DEG * (1.0 - math.cos(DEG))  # m aside, of an arc of 2 m from the vertical to 1 deg
+
+
 def column_of(tmp_path: Path, inclination: float, azimuth: float, **settings: Any) -> tuple[RigModel, dict[str, Any]]:
     """Five stations of a hole that leans alike all along, each read by the tube at the bit."""
     measurements = [(survey(1, stop, 1, inclination, azimuth), 2.0 * stop) for stop in range(1, 6)]
@@ -314,9 +317,10 @@ def test_a_column_is_told_in_centimetres_percent_and_degrees(tmp_path: Path) -> 
     model, view = column_of(tmp_path, 1.0, 120.0)
     assert view["design"] == {
         "inclination_deg": 0.0, "azimuth_deg": 0.0, "target_m": 30.0, "radius_m": 0.6, "tolerance": "en-12716",
+        "course_m": [[0.0, 0.0, 0.0, 0.0], [30.0, 0.0, 0.0, 30.0]],
     }  # fmt: skip
     toe, point = view["stations"][-1], model.hole.trajectory[-1]
-    lateral = 9.0 * math.sin(DEG)  # the first leg starts vertical
+    lateral = 8.0 * math.sin(DEG) + FIRST_LEG
     assert toe["md_m"] == 10.0
     assert toe["deviation_cm"] == pytest.approx(100.0 * lateral, rel=1e-6)
     assert toe["north_cm"] == pytest.approx(-50.0 * lateral, rel=1e-6)
@@ -350,9 +354,20 @@ def test_the_view_says_which_angle_dominates(tmp_path: Path) -> None:
     assert flat["dominant"]["angle"] == "azimuth"
 
 
+def test_a_column_along_its_inclined_design_does_not_deviate(tmp_path: Path) -> None:
+    design = {"design_inclination_deg": 10.0, "design_azimuth_deg": 70.0}
+    collar = {"collar_inclination_deg": 10.0, "collar_azimuth_deg": 70.0}
+    _, view = column_of(tmp_path, 10.0, 70.0, **design, **collar)
+    for row in (*view["stations"], view["projection"]):
+        assert row["deviation_cm"] == pytest.approx(0.0, abs=1e-9)
+
+
 def test_a_column_along_its_inclined_design_deviates_by_its_vertical_start_alone(tmp_path: Path) -> None:
-    _, view = column_of(tmp_path, 10.0, 70.0, design_inclination_deg=10.0, design_azimuth_deg=70.0)
-    start = 100.0 * math.sin(10.0 * DEG)  # 1 m of the first leg is vertical
+    design = {"design_inclination_deg": 10.0, "design_azimuth_deg": 70.0}
+    _, view = column_of(tmp_path, 10.0, 70.0, **design, collar_inclination_deg=0.0)
+    bend = 10.0 * DEG  # an arc from the vertical falls behind the chord of the design
+    along, aside = 2.0 / bend * math.sin(bend), 2.0 / bend * (1.0 - math.cos(bend))
+    start = 100.0 * (along * math.sin(bend) - aside * math.cos(bend))
     assert [row["deviation_cm"] for row in view["stations"][1:]] == pytest.approx([start] * 5, rel=1e-6)
     assert view["projection"]["deviation_cm"] == pytest.approx(start, rel=1e-6)
 
@@ -365,9 +380,9 @@ def test_a_column_that_leaves_its_tolerance_raises_alarms_with_their_threshold(t
     assert set(deviations) == {50, 80, 100}
     assert deviations[50]["threshold_cm"] == pytest.approx(2.5)
     assert deviations[80]["threshold_cm"] == pytest.approx(4.0)
-    # 1, 3, 5 stations' sum of sines: 1.75 cm at 2 m, 5.24 cm at 4 m
+    # an arc of 2 m and 2 m straight: 1.75 cm at 2 m, 5.24 cm at 4 m
     assert deviations[50]["md_m"] == deviations[100]["md_m"] == 4.0
-    assert deviations[100]["deviation_cm"] == pytest.approx(300.0 * math.sin(DEG), rel=1e-6)
+    assert deviations[100]["deviation_cm"] == pytest.approx(100.0 * (2.0 * math.sin(DEG) + FIRST_LEG), rel=1e-6)
     assert deviations[50]["raised_at_s"] == pytest.approx(2 * BETWEEN_STOPS, abs=5.0)
     assert deviations[50]["cleared_at_s"] is None
     projected = [row for row in view["active"] if row["kind"] == "projection"]

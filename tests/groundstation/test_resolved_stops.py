@@ -41,7 +41,7 @@ def stops_of(tube: int, number: int, at: float, imus: int = 1) -> ResolvedStops:
     """A table of one stop."""
     resolver = Resolver(9.81, SharedErrors(), 1e-8, 1e-3)
     measured = survey(tube, number, at, imus)
-    (found,) = resolver.resolve_measurements([measured], [2.0 * tube], [list(range(tube + 1, tube + 3))])
+    (found,) = resolver.resolve_measurements([measured], [2.0 * tube], [list(range(tube + 1, tube + 3))], [[]])
     assert found is not None
     rows = found[0].rows
     rows["quality"] = Quality.MOTION | Quality.SPREAD if number % 3 == 0 else Quality.GOOD

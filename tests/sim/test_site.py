@@ -43,14 +43,14 @@ def test_the_joint_opens_on_the_key_while_the_third_hole_is_drilled(tmp_path: Pa
     holes = re.split(r" hole +H\d", done.output)
     assert len(holes) == 4
     third = [(name, state, float(chance), int(surveyed)) for name, state, chance, surveyed in JOINT.findall(holes[3])]
-    assert {row[0] for row in third} == {"H3-H2"}
+    assert {row[0] for row in third} == {"H2-H3"}
     assert [row[1] for row in third] == ["missing"] * (len(third) - 1) + ["surveyed"]
     assert [row[3] for row in third] == sorted(row[3] for row in third)
     assert third[0][2] < 0.01 < 0.99 < third[-1][2]
     result = json.loads((out / "H3" / "result.json").read_text())
     assert result["wall"]["verdict"] == "not_tight"
     second = json.loads((out / "H2" / "result.json").read_text())["wall"]
-    closed = next(joint for joint in second["joints"] if joint["joint"] == "H2-H1")
+    closed = next(joint for joint in second["joints"] if joint["joint"] == "H1-H2")
     assert (closed["state"], closed["probability"] < 0.01) == ("surveyed", True)
     judged = CliRunner().invoke(wall, [str(out / "wall.toml"), "--json"])
     assert judged.exit_code == 3, judged.output  # not tight: the same word afterwards

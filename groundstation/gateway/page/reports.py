@@ -11,7 +11,7 @@ from groundstation.gateway.page.request_guard import RequestError
 from groundstation.service.answers.csv_tables import table_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.paths import find_path
-from groundstation.service.answers.wall_views import stations_of
+from groundstation.service.answers.wall_views import survey_of
 from groundstation.service.hole.live_wall import Neighbourhood
 
 SUBJECTS = ("wall", "hole")
@@ -47,7 +47,7 @@ class ReportTypesetter:
             raise RequestError(404, "report: this rig has no wall; see --wall and --hole of borechain ground")
         if self._is_busy:
             raise RequestError(503, "another report is being made", retry_after=REPORT_WITHIN_S)
-        found = wall.judged(stations_of(self._model), self._model.string.bit)
+        found = wall.judged(survey_of(self._model), self._model.string.bit)
         stations = find_path(self._model, "stations")
         text = table_of("stations", stations.fields, stations.show(self._model, {}))
         inputs = [*wall.inputs, ("the stations of this rig", hashlib.sha256(text.encode()).hexdigest())]

@@ -66,6 +66,7 @@ class Watch:
         self._gaps: dict[int, Gap] = {}
         self._cross_check = EncoderCrossCheck()
         self._told_unplaced: set[int] = set()  # tubes
+        self._told_back: set[float] = set()  # m, stations that turn back
         self._blamed: set[str] = set()  # subjects of what was found to be wrong with the hole
         self._depth_due = math.inf  # s, own clock, since when tubes are known and a depth may be expected
 
@@ -276,6 +277,11 @@ class Watch:
             numbers = ", ".join(map(str, overdue.get(tube, [])[:10]))
             self._alarms.hold("survey_unplaced", f"tube {tube}", f"numbers {numbers}" if numbers else "")
         self._told_unplaced = set(overdue)
+        back = set(self._hole.turned_back)
+        for md in back | self._told_back:
+            what = "it points back up the hole: the hole is not known from there on" if md in back else ""
+            self._alarms.hold("survey_refused", f"station at {md:.2f} m", what)
+        self._told_back = back
 
     def _look_at_stops(self) -> None:
         stops = self._string.stops

@@ -23,11 +23,12 @@ from groundstation.service.answers.shapes.column_shapes import (
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.answers.thinning import FEWEST, largest_triangles
 from groundstation.service.hole.history import History, Moment
-from groundstation.survey.wall.column_deviation import Deviation, lateral_errors, used_share
+from groundstation.survey.wall.column_deviation import ColumnDesign, Deviation, lateral_errors, used_share
 
 POINTS, MOST_POINTS = 200, 1000  # of the history
 SHOWN = 30  # numbers that a refusal names
 CM = 100.0
+COURSE = 50  # pieces in which a plan is shown
 
 
 @view_of(ColumnAnswer)
@@ -36,22 +37,30 @@ def answer_column(k: RigModel, p: Parameters) -> ColumnAnswer:
 
     ``moment`` gives what was known at the end of an earlier stop.
     """
-    config, hole = k.config, k.hole
+    hole = k.hole
     moment = _moment(hole.history, p["moment"]) if "moment" in p else None
     rows = list(hole.deviations) if moment is None else moment.rows
     end = hole.projection if moment is None else moment.projection
     return ColumnAnswer(
-        design=DesignAxis(
-            inclination_deg=config.design_inclination_deg,
-            azimuth_deg=config.design_azimuth_deg,
-            target_m=config.design.length,
-            radius_m=config.design.radius,
-            tolerance=config.design.tolerance.name,
-        ),
+        design=design_axis(k.config.design),
         stations=[column_deviation(row) for row in rows],
         worst=column_deviation(max(rows, key=lambda row: row.ratio)),
         projection=None if end is None else column_deviation(end),
         dominant=None if moment is not None else _dominant(k),
+    )
+
+
+def design_axis(design: ColumnDesign) -> DesignAxis:
+    """The design of the column."""
+    pieces = 1 if design.plan is None else COURSE
+    along = np.linspace(0.0, design.length, pieces + 1)
+    return DesignAxis(
+        inclination_deg=math.degrees(design.inclination),
+        azimuth_deg=math.degrees(design.azimuth),
+        target_m=design.length,
+        radius_m=design.radius,
+        tolerance=design.tolerance.name,
+        course_m=np.column_stack([along, design.points_at(along)]).round(4).tolist(),
     )
 
 

@@ -29,15 +29,13 @@ from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.hole.station import SurveyStation
 from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.survey.fusion.resolve import angle_stds_of_all, direction_angles
-from groundstation.survey.fusion.shared import KIND_NAMES
 from groundstation.survey.well.ellipsoid import Ellipse, coverage_radius, ellipsoid_axes, plan_ellipses
-from groundstation.survey.well.trajectory import TrajectoryPoint, interpolate_point
+from groundstation.survey.well.trajectory import TrajectoryPoint
 
 Array = npt.NDArray[np.float64]
 Values = dict[str, Any]  # of some fields of a row
 POSITION = ("north_m", "east_m", "tvd_m", "sigma_north_m", "sigma_east_m", "sigma_tvd_m")
 CONFIDENCE = 0.95
-SOURCES = ("random", *KIND_NAMES)
 
 
 @view_of(StationsAnswer)
@@ -118,16 +116,16 @@ def typical_reading(s: SurveyStation) -> Values:
 @view_of(TrajectoryAnswer)
 def answer_trajectory(k: RigModel, p: Parameters) -> TrajectoryAnswer:
     """Positions with covariance: at the stations, in a range of depth, or interpolated at one depth."""
-    points = k.hole.trajectory.points
+    drawn = k.hole.trajectory
     wanted = SelectorRange.of_parameter("md", p)
     if wanted.single:
         try:
-            points = [interpolate_point(points, wanted.low)]
+            points = [drawn.at(wanted.low)]
         except SurveyError as error:
             raise SelectorError(f"parameter md: {error}") from error
-    elif "md" in p:
-        points = [point for point in points if wanted.holds(point.md)]
-    return TrajectoryAnswer("balanced-tangential", trajectory_points(points))
+    else:
+        points = [point for point in drawn.points if "md" not in p or wanted.holds(point.md)]
+    return TrajectoryAnswer(drawn.method.value, trajectory_points(points))
 
 
 def trajectory_points(points: Sequence[TrajectoryPoint]) -> list[TrajectoryRow]:
@@ -159,15 +157,14 @@ def position_values(positions: Array, covs: Array) -> list[Values]:
 @view_of(UncertaintyAnswer)
 def answer_uncertainty(k: RigModel, p: Parameters) -> UncertaintyAnswer:
     """Ellipse in plan and ellipsoid of every station at a confidence, and what they are made of."""
-    drawn, by_kind = k.hole.trajectory, k.hole.variances
+    drawn, by_source = k.hole.trajectory, k.hole.variances
     confidence = _confidence(p.get("confidence"))
     plane, space = coverage_radius(confidence, 2), coverage_radius(confidence, 3)
-    random = np.diagonal(drawn.covs, axis1=1, axis2=2) - by_kind.sum(axis=1)
-    stds = np.sqrt(np.maximum(np.concatenate([random[:, None], by_kind], axis=1), 0.0))
+    names, stds = list(by_source), np.sqrt(np.stack(list(by_source.values()), axis=1))
     sizes, directions = ellipsoid_axes(drawn.covs, space)
     columns = (drawn.md, drawn.covs, sizes, directions, stds)
     rows = zip(*(column.tolist() for column in columns), plan_ellipses(drawn.covs, plane), strict=True)
-    return UncertaintyAnswer(confidence, plane, space, [_region(*row) for row in rows])
+    return UncertaintyAnswer(confidence, plane, space, [_region(names, *row) for row in rows])
 
 
 def _confidence(text: str | None) -> float:
@@ -180,13 +177,13 @@ def _confidence(text: str | None) -> float:
 
 
 def _region(
-    md: float, cov: list[list[float]], sizes: list[float], directions: list[list[float]], stds: list[list[float]],
-    ellipse: Ellipse,
+    names: list[str], md: float, cov: list[list[float]], sizes: list[float], directions: list[list[float]],
+    stds: list[list[float]], ellipse: Ellipse,
 ) -> StationRegion:  # fmt: skip
     return StationRegion(
         md_m=round(md, 6),
         covariance_m2=cov,
         plan_ellipse=PlanEllipse(ellipse.major, ellipse.minor, math.degrees(ellipse.azimuth)),
         ellipsoid=[SemiAxis(size, direction) for size, direction in zip(sizes, directions, strict=True)],
-        sources={name: PositionSigmas(*own) for name, own in zip(SOURCES, stds, strict=True)},
+        sources={name: PositionSigmas(*own) for name, own in zip(names, stds, strict=True)},
     )

@@ -21,6 +21,7 @@ from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.hole.live_wall import LiveWall, Neighbourhood
 from groundstation.survey.fusion.resolve import direction_angles
 from groundstation.survey.wall.as_built import ColumnState
+from groundstation.survey.wall.wall_columns import ColumnSurvey
 from groundstation.survey.wall.wall_joints import worst_depths
 from groundstation.survey.wall.wall_verdict import Judgement, joint_name
 
@@ -31,13 +32,15 @@ def answer_wall(k: RigModel, _p: Parameters) -> WallAnswer:
     live = k.wall
     if live is None:
         return WallAnswer(None)
-    return WallAnswer(wall_neighbourhood(live, live.judged(stations_of(k), k.string.bit)))
+    return WallAnswer(wall_neighbourhood(live, live.judged(survey_of(k), k.string.bit)))
 
 
-def stations_of(k: RigModel) -> list[tuple[float, float, float]]:
-    """Measured depth (m), inclination and azimuth (rad) of the stations below the collar."""
-    found = [(station.md, k.hole.direction_of(station)) for station in k.hole.stations if station.md > 0.0]
-    return [(md, *direction_angles(direction.lean, direction.down)) for md, direction in found]
+def survey_of(k: RigModel) -> ColumnSurvey:
+    """The hole as surveyed, from its collar down, with the covariances of its own positions."""
+    drawn = k.hole.trajectory
+    angles = [direction_angles(tangent[:2], float(tangent[2])) for tangent in drawn.tangents]
+    inclination, azimuth = np.array(angles).T
+    return ColumnSurvey(drawn.md.copy(), inclination, azimuth, covs=drawn.covs.copy())
 
 
 def wall_neighbourhood(live: LiveWall, found: Neighbourhood) -> WallNeighbourhood:
@@ -51,10 +54,16 @@ def wall_neighbourhood(live: LiveWall, found: Neighbourhood) -> WallNeighbourhoo
         verdict=None if judged is None else judged.verdict.value.replace(" ", "_"),
         problem=found.problem or None,
         findings=[] if judged is None else [finding.text for finding in judged.findings],
-        holes=[wall_hole(found, n) for n in range(len(found.wall.plans))],
+        holes=[wall_hole(found, n) for n in holes_shown(found)],
         joints=[] if judged is None else [wall_joint(found, judged, n) for n in range(len(judged.joints.pairs))],
         extra_columns=[] if judged is None else closing_columns(found, judged),
     )
+
+
+def holes_shown(found: Neighbourhood) -> list[int]:
+    """The hole itself, and those that it has joints with."""
+    beside = {found.own, *found.wall.pairs.ravel().tolist()}
+    return sorted(beside, key=lambda n: (n != found.own, n))
 
 
 def wall_hole(found: Neighbourhood, n: int) -> WallHole:
@@ -99,14 +108,15 @@ def probability_where(probability: Any, where: Any) -> float | None:
 
 def closing_columns(found: Neighbourhood, judged: Judgement) -> list[ClosingColumn]:
     """Columns that would close what is open."""
+    places = [(np.array([e.north, e.east, e.from_depth]) @ found.wall.built.frame).tolist() for _, e in judged.extras]
     return [
         ClosingColumn(
             joint=joint_name(found.wall.columns, judged.joints.pairs[joint]),
-            north_m=round(extra.north, 3),
-            east_m=round(extra.east, 3),
+            north_m=round(north, 3),
+            east_m=round(east, 3),
             from_m=extra.from_depth,
             to_m=extra.to_depth,
             closes=extra.closes,
         )
-        for joint, extra in judged.extras
+        for (joint, extra), (north, east, _) in zip(judged.extras, places, strict=True)
     ]

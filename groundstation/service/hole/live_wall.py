@@ -1,12 +1,13 @@
 """The joints of the hole that is being drilled with its neighbours, judged as the whole wall is judged.
 
-The neighbours stand in a wall file with their surveys; the hole of this ground station is taken from its stations and
-from the depth of the bit. What is not drilled yet is missing, so a joint closes from the top down.
+The neighbours stand in a wall file with their surveys; the hole of this ground station is taken from its stations, with
+their own covariances, and from the depth of the bit. What is not drilled yet is missing, so a joint closes from the top
+down. What is judged is the part of the wall around the hole, in the planes of the whole wall and by the same function:
+the file with these stations in it gives the same.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,17 +15,21 @@ import numpy as np
 
 from groundstation.errors import SurveyError
 from groundstation.survey.wall.wall_columns import ColumnPlan, ColumnStatus, ColumnSurvey, build_wall
-from groundstation.survey.wall.wall_file import Wall, read_wall
-from groundstation.survey.wall.wall_verdict import Judgement, judge_columns
+from groundstation.survey.wall.wall_file import Wall, judge_wall, part_around, read_wall
+from groundstation.survey.wall.wall_verdict import Judgement
 
-Station = tuple[float, float, float]  # measured depth (m), inclination, azimuth (rad)
+NO_SURVEY = ColumnSurvey(*np.zeros((3, 0)))
 
 
 @dataclass(frozen=True, slots=True)
 class Neighbourhood:
-    """The hole and its neighbours as judged: the wall they are, and what was found; or why they cannot be judged."""
+    """The hole and its neighbours as judged: the wall they are, which of its columns is the hole, and what was found.
+
+    Or why they cannot be judged.
+    """
 
     wall: Wall
+    own: int
     judgement: Judgement | None
     problem: str = ""
 
@@ -54,57 +59,42 @@ class LiveWall:
             raise SurveyError(f"{path}: column {hole!r:.40} is not among the heads; expected one of {', '.join(names)}")
         self.hole = hole
         self.inputs = whole.file.digests()
-        own = names.index(hole)
-        around = sorted({int(k) for pair in whole.pairs for k in pair if own in pair} - {own})
-        if not around:
-            raise SurveyError(f"{path}: column {hole} has no neighbour")
-        self._members = [own, *around]
-        pairs = np.array([[0, n] for n in range(1, len(self._members))], np.intp)
-        self._wall = replace(
-            whole,
-            plans=[whole.plans[k] for k in self._members],
-            holes=[whole.holes[k] for k in self._members],
-            drilled_on=[whole.drilled_on[k] for k in self._members],
-            pairs=pairs,
-            detours=[],
-        )
-        self._known: tuple[tuple[Station, ...], int] | None = None
-        self._judged = Neighbourhood(self._wall, None, "nothing has been judged yet")
+        self._wall, self._own = part_around(whole, names.index(hole))
+        self._known: tuple[bytes, int] | None = None
+        self._judged = Neighbourhood(self._wall, self._own, None, "nothing has been judged yet")
 
-    def judged(self, stations: Sequence[Station], bit: float | None) -> Neighbourhood:
-        """The joints with these stations and the bit (m) there; judged anew where one of them has changed."""
-        known = (tuple(stations), self.plane_of(bit))
+    def judged(self, survey: ColumnSurvey, bit: float | None) -> Neighbourhood:
+        """The joints with this survey of the hole from its collar on and the bit (m) there; anew where one changed.
+
+        The survey counts from the north that the stations of the wall's file count from.
+        """
+        arrays = (survey.md, survey.inclination, survey.azimuth, *(() if survey.covs is None else (survey.covs,)))
+        known = (b"".join(array.tobytes() for array in arrays), self.plane_of(bit))
         if known != self._known:
             self._known = known
-            self._judged = self._judge(stations, bit or 0.0)
+            self._judged = self._judge(survey, bit or 0.0)
         return self._judged
 
     def plane_of(self, bit: float | None) -> int:
         """Number of the plane that a bit (m) has passed last."""
         return int((bit or 0.0) / self._wall.file.assumed.step)
 
-    def _judge(self, stations: Sequence[Station], bit: float) -> Neighbourhood:
-        file = self._wall.file
-        plans = [own_plan(self._wall.plans[0], stations, bit), *self._wall.plans[1:]]
-        holes = [hole_of(stations), *self._wall.holes[1:]]
+    def _judge(self, survey: ColumnSurvey, bit: float) -> Neighbourhood:
+        file, own = self._wall.file, self._own
+        plans, holes = list(self._wall.plans), list(self._wall.holes)
+        plans[own] = own_plan(plans[own], survey, bit)
+        holes[own] = survey.turned(file.stations_turn) if len(survey.md) > 1 else NO_SURVEY
         try:
-            built = build_wall(plans, holes, file.assumed)
+            built = build_wall(plans, holes, file.assumed, self._wall.built)
             wall = replace(self._wall, plans=plans, holes=holes, built=built)
-            found = judge_columns(built.columns, wall.pairs, file.thickness, allowed=file.allowed)
+            return Neighbourhood(wall, own, judge_wall(wall, own))
         except SurveyError as error:
-            return Neighbourhood(self._wall, None, str(error))
-        return Neighbourhood(wall, found)
+            return Neighbourhood(self._wall, own, None, str(error))
 
 
-def own_plan(plan: ColumnPlan, stations: Sequence[Station], bit: float) -> ColumnPlan:
+def own_plan(plan: ColumnPlan, survey: ColumnSurvey, bit: float) -> ColumnPlan:
     """The column as far as it is drilled now."""
-    end = max([bit, *(md for md, _, _ in stations)])
+    end = max(bit, float(survey.md.max(initial=0.0)))
     if end <= 0.0:
         return replace(plan, status=ColumnStatus.PLANNED, drilled=None)
     return replace(plan, status=ColumnStatus.UNSTATED, drilled=end)
-
-
-def hole_of(stations: Sequence[Station]) -> ColumnSurvey:
-    """Stations below the head, which is vertical as the ground station's trajectory begins."""
-    rows = np.array([(0.0, 0.0, 0.0), *(row for row in stations if row[0] > 0.0)])
-    return ColumnSurvey(*rows.T) if len(rows) > 1 else ColumnSurvey(*np.zeros((3, 0)))

@@ -84,12 +84,13 @@ class Placement:
 
         None for each that is not fused.
         """
-        fused, above, places, depths = [], [], [], []
+        fused, above, below, places, depths = [], [], [], [], []
         for place, m in enumerate(measurements):
             if trust_of(m.flags) not in NEVER_FUSED:
                 chain = self._string.tally.above(m.tube, m.hops)
                 fused.append(corrected_measurement(m, chain, self._setup))
                 above.append(chain)
+                below.append(self._string.tally.below(m.tube))
                 places.append(place)
                 md = mds[place]
                 if self._setup.moves_depths:
@@ -97,7 +98,7 @@ class Placement:
                 depths.append(max(md, 0.0))
         found: list[Found | None] = [None] * len(measurements)
         if fused:
-            resolved = self._resolver.resolve_measurements(fused, depths, above)
+            resolved = self._resolver.resolve_measurements(fused, depths, above, below)
             for place, one in zip(places, resolved, strict=True):
                 found[place] = one
         return found

@@ -104,12 +104,14 @@ class ResolvedStops:
     rows : of the table, some of them not used yet
     forces : (imus, 3) of each stop as bytes, m/s^2
     places : of the columns of each stop, see ``groundstation.survey.fusion.shared``
+    depth_places : of the columns of the depth of each
     """
 
     def __init__(self, count: int | None = None) -> None:
         self.rows: Rows = np.empty(FEWEST if count is None else count, ROW)
         self.forces: list[bytes] = [b""] * (count or 0)
         self.places: list[Places] = []
+        self.depth_places: list[Places] = []
 
     def __len__(self) -> int:
         return len(self.forces)
@@ -134,6 +136,7 @@ class ResolvedStops:
         self.rows[own] = other.rows[row]
         self.forces.append(other.forces[row])
         self.places.append(other.places[row])
+        self.depth_places.append(other.depth_places[row])
         return own
 
     def replace_stop(self, own: int, other: ResolvedStops, row: int) -> None:
@@ -142,6 +145,7 @@ class ResolvedStops:
         self.rows[own] = other.rows[row]
         self.rows["replaces"][own] = replaced
         self.places[own] = other.places[row]
+        self.depth_places[own] = other.depth_places[row]
 
     def is_revised_by(self, own: int, other: ResolvedStops, row: int) -> bool:
         """Whether a stop of another table is that of a row again: of the same tube and time, and the same readings."""

@@ -47,7 +47,11 @@ class Resolver:
         self._noise = math.radians(ACCELEROMETER_NOISE_DEG) * gravity
 
     def resolve_measurements(
-        self, measurements: Sequence[SurveyMeasurement], mds: Sequence[float], above: Sequence[Sequence[int] | None]
+        self,
+        measurements: Sequence[SurveyMeasurement],
+        mds: Sequence[float],
+        above: Sequence[Sequence[int] | None],
+        below: Sequence[Sequence[int]],
     ) -> list[Found | None]:
         """What each comes to; None of one whose numbers are no measurement.
 
@@ -58,6 +62,7 @@ class Resolver:
         measurements : in the order in which they are placed
         mds : m, depths of their tubes
         above : tubes above each, lowest first; None where the order of the string is not known
+        below : tubes below the node of each, from the bit up
         """
         try:
             stops = self._resolve_together(measurements, above)
@@ -65,9 +70,10 @@ class Resolver:
         except (SurveyError, np.linalg.LinAlgError):
             if len(measurements) == 1:
                 return [None]
-            each = zip(measurements, mds, above, strict=True)  # which of them it is comes out by itself
-            return [self.resolve_measurements([m], [md], [tubes])[0] for m, md, tubes in each]
+            each = zip(measurements, mds, above, below, strict=True)  # which of them it is comes out by itself
+            return [self.resolve_measurements([m], [md], [over], [under])[0] for m, md, over, under in each]
         stops.rows["md"] = mds
+        stops.depth_places = [*map(self._shared.depth_places_of, below)]
         return [(stops, row) for row in range(len(measurements))]
 
     def _resolve_together(

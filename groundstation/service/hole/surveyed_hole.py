@@ -27,10 +27,11 @@ from groundstation.service.setup.setup_book import SetupBook
 from groundstation.service.setup.setup_priors import collar_direction, north_std
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
-from groundstation.survey.fusion.shared import SharedErrors
+from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
 from groundstation.survey.fusion.survey_trust import Trust
 from groundstation.survey.fusion.transport import Carried, carry_directions
 from groundstation.survey.wall.column_deviation import Deviation, Deviations, axis_deviations, project_to_target
+from groundstation.survey.well.depth_errors import mean_depth
 from groundstation.survey.well.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
@@ -53,6 +54,7 @@ class SurveyedHole:
         self._design = config.design
         self.version = 0  # grows with every survey
         self.newest = 0  # number of the measurement that came last, revisions included
+        self._depth_errors = config.depth_errors
         self.begin_anew()
 
     def begin_anew(self) -> None:
@@ -70,7 +72,7 @@ class SurveyedHole:
         self._alarms = AlarmList()
         self._history = History()
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
-        self._trajectory = Trajectory(collar=self._collar, keeps_columns=False)
+        self._trajectory = Trajectory(collar=self._collar, wander=self._config.wander, keeps_columns=False)
         self._deviations = self._deviate()
         self._projection: Deviation | None = None
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
@@ -149,6 +151,11 @@ class SurveyedHole:
         """Direction at the collar as well as it is known."""
         return self._collar
 
+    @property
+    def turned_back(self) -> list[float]:
+        """Depths (m) of stations that point back against the one above, in the trajectory as it was drawn last."""
+        return self._trajectory.turned_back
+
     def direction_of(self, station: SurveyStation) -> Direction:
         """Direction of the hole at a station, the transport of the string in it."""
         self.settle()
@@ -198,12 +205,18 @@ class SurveyedHole:
         return (0.0, 0.0) if carried is None else (carried.gamma, carried.std)
 
     @property
-    def variances(self) -> Array:
-        """Variances (n, kinds, 3) of the positions along the trajectory (m^2) by what their stations share.
+    def variances(self) -> dict[str, Array]:
+        """Variances (n, 3) of the positions along the trajectory (m^2) by their sources, which add up to the whole.
 
         They are worked out when they are asked for: a start goes through hundreds of stops and shows none of them.
         """
-        return np.concatenate([self._shared.variances(columns) for columns in self.trajectory.columns()])
+        drawn = self.trajectory
+        shared = np.concatenate([self._shared.variances(columns) for columns in drawn.columns()])
+        found = dict(zip(KIND_NAMES, np.moveaxis(shared, 1, 0), strict=True))
+        found["depth"] = found["depth"] + np.diagonal(drawn.depth_covs, axis1=1, axis2=2)
+        found["path"] = np.diagonal(drawn.path_covs, axis1=1, axis2=2)
+        rest = np.diagonal(drawn.covs, axis1=1, axis2=2) - sum(found.values())
+        return {"random": np.maximum(rest, 0.0)} | found
 
     def place_of(self, station: SurveyStation) -> int:
         """Place of a station in the trajectory; that of the collar for one at its depth."""
@@ -245,7 +258,11 @@ class SurveyedHole:
         return changed
 
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
-        self._trajectory.put(self._directions(changed))
+        depths, places_of = {}, self._stops.depth_places.__getitem__
+        for one in changed:
+            places = [*map(places_of, one.stops.rows)]
+            depths[one.md] = mean_depth(one.md, places, self._depth_errors, self._config.tube_length)
+        self._trajectory.put(self._directions(changed), depths)
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)
         if worst is None:

@@ -47,6 +47,10 @@ class Tally:
         over = self.tubes[: self.tubes.index(tube)][::-1]
         return over[: hops - 1] if 1 <= hops <= len(over) + 1 else None
 
+    def below(self, tube: int) -> list[int]:
+        """Tubes between a tube's node and the bit, from the bit up; none of an unknown tube."""
+        return self.tubes[: self.tubes.index(tube) : -1] if tube in self.tubes else []
+
     @property
     def deepest(self) -> float:
         """What the string and one tube more reach (m); infinite before any tube has reported."""

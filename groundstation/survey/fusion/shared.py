@@ -23,7 +23,10 @@ Name = tuple[str | int, ...]
 AXES = 3  # of an accelerometer
 CAUSES = 2 + AXES  # of the columns of a reading: mount, joint, and each axis
 MOST_OF_16_BITS = 1 << 16
-KINDS = {"mount": "mounts", "joint": "joints", "drive": "joints", "string": "joints", "bias": "accelerometer_bias"}
+KINDS = {
+    "mount": "mounts", "joint": "joints", "drive": "joints", "string": "joints", "bias": "accelerometer_bias",
+    "scale": "depth", "offset": "depth", "length": "depth",
+}  # fmt: skip
 KIND_NAMES = sorted(set(KINDS.values()))
 TRANSPORT, ADJUSTED = "transport", "adjusted"  # of columns that random errors share; they are of no kind
 
@@ -78,9 +81,7 @@ class Packed:
 
     def under(self, matrix: Array) -> Packed:
         """Return the columns ``matrix`` (j, k) @ columns (k, s), of shape (j, s)."""
-        made = Packed.__new__(Packed)
-        made.places, made.values, made.width = self.places, matrix @ self.values, self.width
-        return made
+        return Packed.of_values(matrix @ self.values, self.places, self.width)
 
     def columns(self) -> Array:
         """All of them (k, s), made anew."""
@@ -140,7 +141,7 @@ class SharedErrors:
     def __init__(self) -> None:
         self._columns: dict[Name, int] = {}
         self._places: dict[str, list[int]] = {}  # of the columns of each kind, in the order of their coming
-        self._known: dict[tuple[int, ...] | int, Places] = {}  # by a tube and those above it, or a tube alone
+        self._known: dict[Name | int, Places] = {}  # by a tube and those above it, or a tube alone; of depths too
         self._transport: list[int] = []
         self._adjusted: list[int] = []
         self._chains: dict[tuple[int, ...] | int, int] = {}
@@ -206,12 +207,21 @@ class SharedErrors:
 
     def places_of(self, tube: int, above: Sequence[int] | None) -> Places:
         """Places of the errors of a tube, kept once for all of its readings in one string."""
-        string = tube if above is None else (tube, *above)
+        string: Name | int = tube if above is None else (tube, *above)
         known = self._known.get(string)
         if known is None:
             chain = self._chain(tube, above)
             names: list[Name] = [("mount", tube), *chain, *(("bias", tube, axis) for axis in range(AXES))]
             known = self._known[string] = np.array([self._place_of(name) for name in names], np.intp)
+        return known
+
+    def depth_places_of(self, below: Sequence[int]) -> Places:
+        """Places of the errors of a depth: scale, offset, and the length of each tube ``below`` from the bit up."""
+        key: Name = ("depth", *below)
+        known = self._known.get(key)
+        if known is None:
+            names: list[Name] = [("scale",), ("offset",), *(("length", tube) for tube in below)]
+            known = self._known[key] = np.array([self._place_of(name) for name in names], np.intp)
         return known
 
     def chain_of(self, tube: int, above: Sequence[int] | None) -> int:

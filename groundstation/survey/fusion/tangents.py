@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import attrgetter
 
 import numpy as np
 import numpy.typing as npt
@@ -10,11 +11,13 @@ import numpy.typing as npt
 from groundstation.survey.fusion.resolve import Direction
 
 Array = npt.NDArray[np.float64]
+LEAN, DOWN = map(attrgetter, ("lean", "down"))
 
 
 def tangents_of(directions: Sequence[Direction]) -> Array:
     """Downhole unit vectors (n, 3)."""
-    return np.array([(*direction.lean.tolist(), direction.down) for direction in directions]).reshape(-1, 3)
+    leans, downs = np.array([*map(LEAN, directions)]).reshape(-1, 2), np.array([*map(DOWN, directions)])
+    return np.concatenate([leans, downs[:, None]], axis=1)
 
 
 def tangent_jacobians(tangents: Array) -> Array:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from groundstation.survey.well.analysis import Analysis
+from groundstation.survey.well.arcs import on_arc
 from groundstation.survey.well.ellipsoid import hole_axes, plan_ellipse
 from groundstation.survey.well.methods import station_tangents
-from groundstation.survey.well.trajectory import TrajectoryPoint, interpolate_point
 
 COORDINATES = ("northing_m", "easting_m", "height_m")
 
@@ -68,16 +68,14 @@ def highside_region(cov: Any, sigma: float, inclination: float, azimuth: float) 
 
 def station_at_depth(found: Analysis, md: float, sigma: float) -> dict[str, Any]:
     """Position on the arc and its uncertainty at any depth."""
-    directions = station_tangents(found.record.inclination, found.azimuth)
-    none, no_columns = np.zeros((3, 3)), np.zeros((3, 0))
-    points = [
-        TrajectoryPoint(float(m), t, p, none, no_columns)
-        for m, t, p in zip(found.md, directions, found.positions, strict=True)
-    ]
-    point = interpolate_point(points, md)
-    north, east, tvd = point.position.tolist()
+    cov, mds, positions = found.covariance_at(md), found.md, found.positions
+    tangents = station_tangents(found.record.inclination, found.azimuth)
+    k = max(int(np.searchsorted(mds, md)) - 1, 0)
+    leg = float(mds[k + 1] - mds[k])
+    moved, _ = on_arc(tangents[k], tangents[k + 1], positions[k + 1] - positions[k], leg, float(md - mds[k]) / leg)
+    north, east, tvd = (positions[k] + moved).tolist()
     place = {"md_m": md, "north_m": north, "east_m": east, "tvd_m": tvd}
-    return place | {"uncertainty": uncertainty_region(found.covariance_at(md), sigma)}
+    return place | {"uncertainty": uncertainty_region(cov, sigma)}
 
 
 def source_rows(found: Analysis, sigma: float) -> list[dict[str, Any]]:

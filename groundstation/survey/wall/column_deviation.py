@@ -1,6 +1,7 @@
 """Is the column where it should be? Deviation from the design axis, tolerance, projection to the target.
 
-A design axis is a straight line from its head. At a depth along it the deviation is the part of the offset across it.
+A design axis is a straight line from its head, or a plan of arcs and lines. The deviation of a point is its offset from
+the nearest point of the axis, in the plane across it there.
 For near-vertical columns inclination matters far more than azimuth; ``Dominant`` says which of the two does here.
 Source: EN 12716 for the preset of that name; thesis chapter 1 for 0.27 deg. Frame: north, east, down; m and rad.
 """
@@ -13,6 +14,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +22,7 @@ import numpy.typing as npt
 from groundstation.errors import SurveyError
 from groundstation.survey.fusion.resolve import Direction, angle_stds, direction_angles
 from groundstation.survey.well.trajectory import TrajectoryPoint
+from groundstation.survey.well.well_plan import WellPlan
 
 Array = npt.NDArray[np.float64]
 STEEPEST = 0.05  # cosine between hole and axis, below which the hole does not come to the target's depth
@@ -85,6 +88,16 @@ def parse_tolerance(name: str) -> Tolerance:
     return Tolerance(name, start, growth)
 
 
+@dataclass(frozen=True, slots=True)
+class DesignEnd:
+    """Where a design ends: the plane across it there is what a hole is projected to."""
+
+    point: Array  # (3,) m, in the frame of the trajectory
+    tangent: Array  # (3,) unit vector on from there
+    across: Array  # (2, 3) unit vectors in the plane; north and east for a vertical end
+    limit: float  # m
+
+
 @dataclass(frozen=True)  # with a dictionary, for what is worked out once
 class ColumnDesign:
     """Axis of a column and what it is to become."""
@@ -96,10 +109,19 @@ class ColumnDesign:
     length: float = 30.0  # m along the axis
     radius: float = 0.6  # m, of the finished column
     tolerance: Tolerance = PRESETS["en-12716"]
+    plan: WellPlan | None = None  # from the head, in place of the straight line; see ``of_plan``
+
+    @classmethod
+    def of_plan(
+        cls, name: str, plan: WellPlan, head: tuple[float, float, float], radius: float, tolerance: Tolerance
+    ) -> Self:
+        """Design of a plan: it begins in the plan's first direction and is as long as the plan."""
+        first = plan.tangents[0]
+        return cls(name, head, *direction_angles(first[:2], float(first[2])), plan.length, radius, tolerance, plan)
 
     @cached_property
     def axis(self) -> Array:
-        """Unit vector (3,) down the axis."""
+        """Unit vector (3,) down the axis, of a plan at its head."""
         s = math.sin(self.inclination)
         return np.array([s * math.cos(self.azimuth), s * math.sin(self.azimuth), math.cos(self.inclination)])
 
@@ -113,6 +135,20 @@ class ColumnDesign:
             [[math.cos(self.azimuth), -math.sin(self.azimuth)], [math.sin(self.azimuth), math.cos(self.azimuth)]]
         )
         return np.asarray(turn @ np.stack([a, b]))
+
+    def points_at(self, along: Array) -> Array:
+        """Points (n, 3) at lengths (n,) along the axis, m."""
+        head = np.array(self.head)
+        return head + (along[:, None] * self.axis if self.plan is None else self.plan.points_at(along).points)
+
+    @cached_property
+    def end(self) -> DesignEnd:
+        """Target of the column."""
+        limit = self.tolerance.at(self.length)
+        if self.plan is None:
+            return DesignEnd(np.array(self.head) + self.length * self.axis, self.axis, self.across, limit)
+        tangent = self.plan.tangents[-1]
+        return DesignEnd(np.array(self.head) + self.plan.positions[-1], tangent, planes_across(tangent), limit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,12 +229,36 @@ class Deviations:
 def axis_deviations(md: Array, positions: Array, covs: Array, design: ColumnDesign) -> Deviations:
     """Deviation of points at depths (n,), m, with positions (n, 3) and their covariances (n, 3, 3)."""
     offsets = positions - np.array(design.head)
+    if design.plan is not None:
+        return _plan_deviations(md, offsets, covs, design.plan, design.tolerance)
     # number by number: in a product of matrices the last bits of one point depend on how many others there are
     along = (offsets * design.axis).sum(axis=1)
     first, second = (offsets * design.across[0]).sum(axis=1), (offsets * design.across[1]).sum(axis=1)
     across = np.stack([first, second], axis=1)
     limit = design.tolerance.start + design.tolerance.growth * np.maximum(along, 0.0)
     return Deviations(md.copy(), along, across, design.across @ covs @ design.across.T, limit)
+
+
+def _plan_deviations(md: Array, offsets: Array, covs: Array, plan: WellPlan, tolerance: Tolerance) -> Deviations:
+    """The same from a plan, of points (n, 3) against its head."""
+    nearest = plan.nearest(offsets)
+    across = planes_across(nearest.tangents)
+    apart = (across * (offsets - nearest.points)[:, None]).sum(axis=2)
+    turned = across @ covs @ across.transpose(0, 2, 1)
+    limit = tolerance.start + tolerance.growth * np.maximum(nearest.along, 0.0)
+    return Deviations(md.copy(), nearest.along, apart, turned, limit)
+
+
+def planes_across(tangents: Array) -> Array:
+    """Two unit vectors (..., 2, 3) across directions (..., 3): north and east, tilted with the direction.
+
+    They are high side and right turned back by the azimuth, so that they stay as they are where a plan passes the
+    vertical; they have no value straight up.
+    """
+    x, y, z = np.moveaxis(tangents, -1, 0)
+    apart = 1.0 + z
+    first = np.stack([1.0 - x * x / apart, -x * y / apart, -x], axis=-1)
+    return np.stack([first, np.stack([-x * y / apart, 1.0 - y * y / apart, -y], axis=-1)], axis=-2)
 
 
 def point_deviation(point: TrajectoryPoint, design: ColumnDesign) -> Deviation:
@@ -212,13 +272,13 @@ def project_to_target(point: TrajectoryPoint, direction: Direction, design: Colu
     The direction's own error and that of the position are taken as one (fully correlated), for the last station is in
     both: the larger of the two possible answers.
     """
-    offset = point.position - np.array(design.head)
-    axis, across = design.axis, design.across
+    end = design.end
+    axis, across = end.tangent, end.across
     along = float(point.tangent @ axis)
     if along < STEEPEST:
         return point_deviation(point, design)
-    rest = (design.length - float(offset @ axis)) / along
-    target = offset + rest * point.tangent
+    rest = float((end.point - point.position) @ axis) / along
+    target = point.position - end.point + rest * point.tangent
     if rest <= 0.0:
         return point_deviation(point, design)
     # an error along the axis changes how far there is to go: what counts is its trace on the target's plane
@@ -230,9 +290,7 @@ def project_to_target(point: TrajectoryPoint, direction: Direction, design: Colu
     turned = jacobian @ direction.total_cov @ jacobian.T
     here = across @ point.cov @ across.T
     root = _root(here) + _root(turned)
-    return Deviation(
-        point.md + rest, design.length, design.across @ target, root @ root.T, design.tolerance.at(design.length)
-    )
+    return Deviation(point.md + rest, design.length, end.across @ target, root @ root.T, end.limit)
 
 
 def _root(cov: Array) -> Array:

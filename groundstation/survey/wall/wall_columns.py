@@ -17,7 +17,14 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import PropagationMode, SurveyTool
-from groundstation.survey.wall.as_built import TOE, Columns, ColumnState, intersect_planes, plane_frame
+from groundstation.survey.wall.as_built import (
+    TOE,
+    Columns,
+    ColumnState,
+    covariance_roots,
+    intersect_planes,
+    plane_frame,
+)
 from groundstation.survey.wall.column_deviation import ColumnDesign
 from groundstation.survey.wall.plane_errors import PlaneErrors
 from groundstation.survey.wall.tight_depths import TightRange
@@ -60,13 +67,21 @@ class ColumnSurvey:
     """Stations (n,) of one column from its head on; none where it was not surveyed.
 
     Azimuths count from the wall's north. ``record`` holds what else an instrument knows of every station, by the name
-    of its variable: the sigma of its yaw, of its forces.
+    of its variable: the sigma of its yaw, of its forces. ``covs`` (n, 3, 3), m^2, is how well each station is known
+    against the head, where that was told with the survey: then no model of an instrument is asked.
     """
 
     md: Array
     inclination: Array
     azimuth: Array
     record: dict[str, Array] = field(default_factory=dict)
+    covs: Array | None = None
+
+    def turned(self, angle: float) -> ColumnSurvey:
+        """Return the survey counted from another north, from which its own has the azimuth ``angle`` (rad)."""
+        turn = turn_north(-angle)
+        covs = None if self.covs is None else turn @ self.covs @ turn.T
+        return replace(self, azimuth=self.azimuth + angle, covs=covs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +117,7 @@ class Way:
     surveyed_md: float
     end_md: float
     record: dict[str, Array]
+    covs: Array | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,17 +132,23 @@ class BuiltWall:
     toe_covs: Array  # (columns, 3, 3)
 
 
-def build_wall(plans: Sequence[ColumnPlan], holes: Sequence[ColumnSurvey], assumed: Assumptions) -> BuiltWall:
+def build_wall(
+    plans: Sequence[ColumnPlan], holes: Sequence[ColumnSurvey], assumed: Assumptions, whole: BuiltWall | None = None
+) -> BuiltWall:
     """Cut all columns by common planes.
+
+    Parameters
+    ----------
+    whole : of which they are a part, whose planes are used; their own if not given
 
     Raises
     ------
     SurveyError, ToolError
         Names the column whose survey contradicts what is said of it, or that the planes do not cut.
     """
-    frame = plane_frame([plan.design for plan in plans])
+    frame = plane_frame([plan.design for plan in plans]) if whole is None else whole.frame
     ways = [_way(plan, hole) for plan, hole in zip(plans, holes, strict=True)]
-    depths = _depths(plans, frame, assumed)
+    depths = _depths(plans, frame, assumed) if whole is None else whole.columns.depths
     count = len(plans)
     centres = np.full((count, len(depths), 2), np.nan)
     ends, surveyed = np.full((2, count), -np.inf)
@@ -196,11 +218,12 @@ def _way(plan: ColumnPlan, hole: ColumnSurvey) -> Way | None:
     if end < last - SAME_END:
         raise SurveyError(f"column {name}: stated as drilled to {end:g} m, yet surveyed at {last:g} m")
     if end <= last + SAME_END:
-        return Way(hole.md, hole.inclination, hole.azimuth, last, last, hole.record)
+        return Way(hole.md, hole.inclination, hole.azimuth, last, last, hole.record, hole.covs)
     longer = [np.append(values, values[-1]) for values in (hole.md, hole.inclination, hole.azimuth)]
     longer[0][-1] = end
     record = {name: np.append(values, values[-1]) for name, values in hole.record.items()}
-    return Way(longer[0], longer[1], longer[2], last, end, record)
+    covs = None if hole.covs is None else np.concatenate([hole.covs, hole.covs[-1:]])
+    return Way(longer[0], longer[1], longer[2], last, end, record, covs)
 
 
 def _last_survey(way: Way) -> int:
@@ -219,10 +242,11 @@ def _depths(plans: Sequence[ColumnPlan], frame: Array, assumed: Assumptions) -> 
 
 def _alike(plans: Sequence[ColumnPlan], ways: Sequence[Way | None]) -> list[list[int]]:
     """Columns with as many stations of one tool and one record, for one computation each; not too many at once."""
-    groups: dict[tuple[int, int, tuple[str, ...]], list[int]] = {}
+    groups: dict[tuple[int, int, tuple[str, ...], bool], list[int]] = {}
     for k, (plan, way) in enumerate(zip(plans, ways, strict=True)):
         if way is not None:
-            groups.setdefault((len(way.md), id(plan.tool), tuple(sorted(way.record))), []).append(k)
+            key = (len(way.md), id(plan.tool), tuple(sorted(way.record)), way.covs is None)
+            groups.setdefault(key, []).append(k)
     return [some[k : k + AT_ONCE] for some in groups.values() for k in range(0, len(some), AT_ONCE)]
 
 
@@ -233,10 +257,18 @@ def _survey(some: list[tuple[ColumnPlan, Way]], assumed: Assumptions) -> tuple[A
         np.stack([getattr(way, name) for way in ways]) for name in ("md", "inclination", "azimuth")
     )
     places = station_positions(assumed.method, md, inclination, azimuth)
+    told = [way.covs for way in ways if way.covs is not None]
+    if told:
+        return places, station_tangents(inclination, azimuth), [told_errors(np.stack(told))]
     record = {name: np.stack([way.record[name] for way in ways]) for name in ways[0].record}
     tool = some[0][0].tool
     errors = survey_errors(WellSurvey(md, inclination, azimuth, places[..., 2], record), tool, assumed)
     return places, station_tangents(inclination, azimuth), errors
+
+
+def told_errors(covs: Array) -> ErrorColumns:
+    """Errors of stations whose covariances (w, n, 3, 3) are told: what a column is off, it is off all along."""
+    return ErrorColumns("stations", PropagationMode.RANDOM, covariance_roots(covs))
 
 
 def survey_errors(survey: WellSurvey, tool: SurveyTool, assumed: Assumptions) -> list[ErrorColumns]:

@@ -28,7 +28,7 @@ from groundstation.survey.wall.wall_frames import FRAMES, NORTH_ANGLES, ORIGIN, 
 from groundstation.survey.wall.wall_joints import Detour, neighbours_in_grid, neighbours_in_line
 from groundstation.survey.wall.wall_stations import read_holes
 from groundstation.survey.wall.wall_tables import Defaults, Remedy, read_heads
-from groundstation.survey.wall.wall_verdict import Judgement, judge_columns
+from groundstation.survey.wall.wall_verdict import DIAGONAL, Judgement, judge_columns
 from groundstation.survey.well.depth_reference import DEPTHS_FROM
 from groundstation.survey.well.methods import Method
 from groundstation.survey.well.reference_frames import SiteGrid
@@ -290,7 +290,7 @@ def read_wall(path: Path) -> Wall:
     rows = read_heads(file.heads, file.defaults)
     names = [row.name for row in rows]
     surveys = read_holes(file.stations, [row.plan_without_length for row in rows], [row.depths.height for row in rows])
-    holes = [replace(hole, azimuth=hole.azimuth + file.stations_turn) for hole in surveys]
+    holes = [hole.turned(file.stations_turn) for hole in surveys]
     length = file.length or max((float(hole.md[-1]) for hole in holes if len(hole.md)), default=0.0)
     if not length and any(row.length is None for row in rows):
         raise SurveyError(
@@ -307,8 +307,8 @@ def read_wall(path: Path) -> Wall:
     return Wall(file, plans, built, pairs, detours, holes, [row.drilled_on for row in rows])
 
 
-def judge_wall(wall: Wall) -> Judgement:
-    """Judge a wall by what its file requires."""
+def judge_wall(wall: Wall, about: int | None = None) -> Judgement:
+    """Judge a wall by what its file requires; of a grid only voids beside the column ``about``, if one is given."""
     return judge_columns(
         wall.columns,
         wall.pairs,
@@ -317,7 +317,46 @@ def judge_wall(wall: Wall) -> Judgement:
         grid_spacing=wall.grid_spacing,
         detours=wall.detours,
         asked=wall.asked,
+        about=about,
     )
+
+
+def part_around(wall: Wall, own: int) -> tuple[Wall, int]:
+    """The part of a wall that one column has to do with, in the planes of the whole, and its place there.
+
+    That are the joints of the column with their ways by remedial columns, and of a grid all columns that may stand
+    about a void beside it.
+
+    Raises
+    ------
+    SurveyError
+        When the column has no joint.
+    """
+    used = {detour.joint for detour in wall.detours if own in detour.pairs}
+    joints = [j for j, pair in enumerate(wall.pairs.tolist()) if own in pair or j in used]
+    if not joints:
+        raise SurveyError(f"{wall.file.path}: column {wall.plans[own].design.name} has no neighbour")
+    detours = [detour for detour in wall.detours if detour.joint in joints]
+    members = {own, *wall.pairs[joints].ravel().tolist()}
+    members |= {int(k) for detour in detours for k in detour.pairs.ravel()}
+    if wall.grid_spacing is not None:
+        away = np.linalg.norm(wall.columns.designs - wall.columns.designs[own], axis=1)
+        members |= set(np.flatnonzero(away <= 2.0 * DIAGONAL * wall.grid_spacing).tolist())
+    kept = sorted(members)
+    new = {k: place for place, k in enumerate(kept)}
+    part = replace(
+        wall,
+        plans=[wall.plans[k] for k in kept],
+        holes=[wall.holes[k] for k in kept],
+        drilled_on=[wall.drilled_on[k] for k in kept],
+        pairs=_renumbered(wall.pairs[joints], new),
+        detours=[Detour(joints.index(detour.joint), _renumbered(detour.pairs, new)) for detour in detours],
+    )
+    return part, new[own]
+
+
+def _renumbered(pairs: npt.NDArray[np.intp], new: dict[int, int]) -> npt.NDArray[np.intp]:
+    return np.array([[new[k] for k in pair] for pair in pairs.tolist()], np.intp).reshape(-1, 2)
 
 
 def _pairs(file: WallFile, remedies: list[Remedy], built: BuiltWall) -> npt.NDArray[np.intp]:

@@ -20,6 +20,9 @@ from groundstation.survey.well.analysis import RECORD_COLUMNS
 from groundstation.survey.well.reference_frames import SAME_DEPTH
 
 Array = npt.NDArray[np.float64]
+COVARIANCE = ("cov_nn_m2", "cov_ne_m2", "cov_nd_m2", "cov_ee_m2", "cov_ed_m2", "cov_dd_m2")
+PLACES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # of these in a covariance
+ROUNDED = 1e-6  # of a trace, to which a covariance may be rounded in a file
 
 
 def read_holes(path: Path, plans: Sequence[ColumnPlan], heights: list[float]) -> list[ColumnSurvey]:
@@ -27,7 +30,8 @@ def read_holes(path: Path, plans: Sequence[ColumnPlan], heights: list[float]) ->
 
     Depths of a column are brought to its head by ``heights`` (m), how far what they count from lies above it. A station
     at 0 m there tells the direction at the head, for between the two the string is straight. Further columns, those of
-    ``RECORD_COLUMNS``, go with the stations where the instrument asks for them.
+    ``RECORD_COLUMNS``, go with the stations where the instrument asks for them; those of ``COVARIANCE`` say how well
+    each station is known, and no instrument is asked then.
 
     Raises
     ------
@@ -35,7 +39,7 @@ def read_holes(path: Path, plans: Sequence[ColumnPlan], heights: list[float]) ->
         Names file, line and column.
     """
     needed = ("column", "md_m", "inclination_deg", "azimuth_deg")
-    table, lines = read_columns(path, needed, texts=("column", *RECORD_COLUMNS))
+    table, lines = read_columns(path, needed, texts=("column", *RECORD_COLUMNS, *COVARIANCE))
     names = [plan.design.name for plan in plans]
     index = {name: k for k, name in enumerate(names)}
     owner = np.array([index.get(str(name), -1) for name in table["column"]], np.intp)
@@ -59,17 +63,55 @@ def read_holes(path: Path, plans: Sequence[ColumnPlan], heights: list[float]) ->
     at_reference = (np.arange(len(md)) == starts[owner]) & (md == 0.0) & (lift > 0.0)
     md = np.where(at_reference | (np.abs(md - lift) < SAME_DEPTH), 0.0, md - lift)
     _check_depths(path, names, owner, line, md, starts[:-1][counts > 0])
-    cells = {name: table[name][order] for name in RECORD_COLUMNS if name in table}
+    cells = {name: table[name][order] for name in (*RECORD_COLUMNS, *COVARIANCE) if name in table}
     parts = [slice(a, b) for a, b in pairwise(starts)]
     return [
         ColumnSurvey(
             md[part],
             np.radians(inc[part]),
             np.radians(azi[part]),
-            _record(path, plan, line[part], {name: values[part].tolist() for name, values in cells.items()}),
+            *_told(path, plan, line[part], {name: values[part].tolist() for name, values in cells.items()}),
         )
         for plan, part in zip(plans, parts, strict=True)
     ]
+
+
+def _told(
+    path: Path, plan: ColumnPlan, line: npt.NDArray[np.intp], cells: dict[str, list[str]]
+) -> tuple[dict[str, Array], Array | None]:
+    """What a table says of the stations of one column beyond their directions: for an instrument, or covariances."""
+    covs = _covariances(path, plan, line, {name: texts for name, texts in cells.items() if name in COVARIANCE})
+    if covs is None:
+        return _record(path, plan, line, {n: texts for n, texts in cells.items() if n in RECORD_COLUMNS}), None
+    for name, texts in cells.items():
+        if name.startswith("sigma_") and any(texts):
+            raise SurveyError(
+                f"{path}: line {line[0]}: column {plan.design.name}: {name}: the covariances of its stations stand "
+                "there already; leave one of them out"
+            )
+    return {}, covs
+
+
+def _covariances(path: Path, plan: ColumnPlan, line: npt.NDArray[np.intp], cells: dict[str, list[str]]) -> Array | None:
+    """Covariances (n, 3, 3) of one column's stations against its head, m^2; None where none are told."""
+    if not any(any(texts) for texts in cells.values()):
+        return None
+    where = f"{path}: line {line[0]}: column {plan.design.name}"
+    if missing := [name for name in COVARIANCE if name not in cells]:
+        raise SurveyError(f"{where}: expected {', '.join(COVARIANCE)} together, {missing[0]} is missing")
+    covs = np.zeros((len(line), 3, 3))
+    for name, (a, b) in zip(COVARIANCE, PLACES, strict=True):
+        for k, text in enumerate(cells[name]):
+            try:
+                covs[k, a, b] = covs[k, b, a] = float(text) if text or k else 0.0
+            except ValueError:
+                covs[k, a, b] = math.nan
+    for k, cov in enumerate(covs):
+        if not np.all(np.isfinite(cov)) or np.linalg.eigvalsh(cov)[0] < -ROUNDED * np.trace(cov):
+            values = ", ".join(cells[name][k] for name in COVARIANCE)
+            at = f"{path}: line {line[k]}: column {plan.design.name}"
+            raise SurveyError(f"{at}: expected the covariance of a station, got {values}")
+    return covs
 
 
 def _record(path: Path, plan: ColumnPlan, line: npt.NDArray[np.intp], cells: dict[str, list[str]]) -> dict[str, Array]:

@@ -98,6 +98,7 @@ def judge_columns(
     grid_spacing: float | None = None,
     detours: Sequence[Detour] = (),
     asked: npt.NDArray[np.bool_] | None = None,
+    about: int | None = None,
 ) -> Judgement:
     """Judge all joints, the plane of a grid, and the whole.
 
@@ -108,6 +109,8 @@ def judge_columns(
     grid_spacing : of a grid, m; its plane must be covered too
     detours : ways by remedial columns
     asked : (joints, depths) where a joint is to be tight; where either of its designs is required if not given
+    about : the column that is looked at: of others only those that have a joint count as missing, and of a grid only
+        voids beside it or where it is to be
     """
     found = with_detours(columns, judge_joints(columns, pairs, required, asked), detours, required)
     holes: list[VoidFinding] = []
@@ -115,10 +118,13 @@ def judge_columns(
     if grid_spacing is not None:
         triples = triples_of(columns.designs, DIAGONAL * grid_spacing)
         holes = _voids(columns)
+        if about is not None:
+            triples = triples[_triples_beside(columns, triples, about, grid_spacing)]
+            holes = [hole for hole in holes if _is_beside(columns, hole, about, grid_spacing)]
         chance = void_chance(columns, triples)
     whole = system_probability(columns, found, required, triples, detours)
     findings = [
-        *_column_findings(columns),
+        *_column_findings(columns, None if about is None else {about, *pairs.ravel().tolist()}),
         *_joint_findings(columns, found, required, allowed),
         *_design_findings(columns, found, required, allowed),
         *_void_findings(columns, holes),
@@ -131,6 +137,20 @@ def judge_columns(
     proposals = [(j, extra_column(columns, found, j, required)) for j in range(len(pairs))]
     extras = [(j, extra) for j, extra in proposals if extra is not None]
     return Judgement(_verdict(findings), findings, found, holes, whole, extras, chance)
+
+
+def _triples_beside(columns: Columns, triples: npt.NDArray[np.intp], about: int, reach: float) -> npt.NDArray[np.bool_]:
+    """Which triples are a column with two others, or stand around where it is to be."""
+    middle = columns.designs[triples].mean(axis=1) - columns.designs[about]
+    return np.asarray(np.any(triples == about, axis=1) | (np.linalg.norm(middle, axis=1) <= reach))
+
+
+def _is_beside(columns: Columns, hole: VoidFinding, about: int, reach: float) -> bool:
+    """Whether a void is bounded by a column, or is where that one is to be: it may have gone elsewhere."""
+    if about in hole.void.columns:
+        return True
+    depth = int(np.searchsorted(columns.depths, hole.depth))
+    return bool(np.linalg.norm(columns.planned[about, depth] - hole.void.place) <= reach)
 
 
 def _verdict(findings: list[Finding]) -> WallVerdict:
@@ -149,14 +169,15 @@ def true_runs(flags: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
     return list(zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True))
 
 
-def _column_findings(columns: Columns) -> list[Finding]:
+def _column_findings(columns: Columns, among: set[int] | None) -> list[Finding]:
+    """Where columns are missing or not surveyed; ``among`` some of them, if not all."""
     found = []
     words = {
         ColumnState.MISSING: (FindingKind.MISSING, "is missing"),
         ColumnState.UNSURVEYED: (FindingKind.UNSURVEYED, "is not surveyed"),
     }
-    for name, states in zip(columns.names, columns.states, strict=True):
-        for state, (kind, word) in words.items():
+    for k, (name, states) in enumerate(zip(columns.names, columns.states, strict=True)):
+        for state, (kind, word) in words.items() if among is None or k in among else ():
             for first, last in true_runs(states == state):
                 top, bottom = float(columns.depths[first]), float(columns.depths[last])
                 found.append(Finding(kind, name, top, bottom, f"column {name} {word} from {top:g} to {bottom:g} m"))

@@ -77,11 +77,9 @@ class HoleArcs:
 
     def _candidates(self, points: Array) -> tuple[Indices, Indices]:
         """Pairs of a point and an arc that may be nearest to it; an arc lies within half its length of its middle."""
-        from scipy.spatial.distance import cdist
-
         half = 0.5 * self.length
         middles = self.places(np.arange(len(half)), np.full(len(half), 0.5))
-        apart = cdist(points, middles)
+        apart = np.sqrt(sum(np.subtract.outer(points[:, axis], middles[:, axis]) ** 2 for axis in range(3)))
         reach = np.min(apart + half, axis=1, keepdims=True)
         point, arc = np.nonzero(apart - half <= reach + ROUNDING * (1.0 + reach))
         return point, arc

@@ -1,20 +1,24 @@
 """From directions at measured depths to positions with their covariance, one station appended at a time.
 
 A station enters two legs, so its weight in the position is half their summed length, and half the last leg for the last
-station (the Jacobian of the balanced tangential method, used for every method as the industry's error model does).
-Its errors are kept by running sums in a compiled loop: appending costs the same however many stations there are, and
+station: the Jacobian of the balanced tangential method, used for every method as the industry's error model does. Of
+an arc that bends by b it leaves out b/3 along the hole and b^2/12 across it of what one leg makes of an error: of first
+order in the error it is right to first order in the bend, at 3 deg a leg to two hundredths along and to two parts in
+ten thousand across. An error of a depth, e, changes how long a leg is, and so moves what is below it along the leg,
+tau (e_k - e_(k-1)) with the leg's displacement a metre tau. What the path does between stations is in ``leg_wander``.
+Errors are kept by running sums in a compiled loop: appending costs the same however many stations there are, and
 where one changes, those below are drawn from the nearest mark above. What stations share may become more columns as the
 hole grows; the columns of a point are those known when it was added.
-Source: thesis 2.1-2.3 and eqs. I.1-I.12. Frame: north, east, down.
+Source: thesis 2.1-2.3 and eqs. I.1-I.12; Definition of the ISCWSA error model, revision 5. Frame: north, east, down.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import Final
 
 import numpy as np
@@ -25,14 +29,31 @@ from groundstation.survey.fusion.resolve import Direction, direction_angles
 from groundstation.survey.fusion.shared import Packed, add_shared_errors
 from groundstation.survey.fusion.sphere_direction import tangent_errors
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
-from groundstation.survey.well.methods import OPPOSITE, Method, dogleg, leg_displacement, ratio_factor
+from groundstation.survey.path.leg_wander import LegWander
+from groundstation.survey.well.arcs import arc_displacements, bend_angles, on_arc
+from groundstation.survey.well.depth_errors import EXACT, StationDepth
+from groundstation.survey.well.methods import OPPOSITE, Method, leg_displacement
+from groundstation.survey.well.trajectory_rows import (
+    FEWEST,
+    GROWTH,
+    ROW,
+    Followed,
+    TrajectorySums,
+    across_of,
+    runs_of,
+)
 
 Array = npt.NDArray[np.float64]
 BLOCK = 64  # stations from mark to mark
+PLACES, VALUES = map(attrgetter, ("places", "values"))
+DEPTH_PLACES, DEPTH_VALUES = map(attrgetter, ("columns.places", "columns.values"))
 NONE: Final = Packed(np.zeros((2, 0)))
 UNKNOWN: Final = np.zeros((3, 0))
 NOTHING: Final = np.zeros(0)
 FROM_ZERO: Final = np.zeros(1, np.intp)
+STEADY: Final = LegWander(0.0, 1.0)  # a path that does what its arcs do
+ALL_EXACT: Final[Mapping[float, StationDepth]] = {}
+TURNED_BACK = math.cos(math.radians(120.0))  # of the bend of one leg, beyond which it is no hole any more
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,40 +67,6 @@ class TrajectoryPoint:
     shared: Array  # (3, s) m, change for one standard deviation of every shared error; (3, 0) where it is not kept
 
 
-ROW: Final = np.dtype(
-    [
-        ("md", np.float64),
-        ("tangent", np.float64, 3),
-        ("own", np.float64, (3, 3)),  # covariance of the tangent that no other shares
-        ("width", np.intp),  # shared columns that the direction knows
-        ("count", np.intp),  # of them those that are kept
-        ("position", np.float64, 3),
-        ("cov", np.float64, (3, 3)),
-    ]
-)
-FEWEST = 8  # rows of a table
-GROWTH = 8  # share of its rows by which a table grows
-
-
-@dataclass(frozen=True, slots=True)
-class TrajectorySums:
-    """Running sums of the error kernel at a station, and the length of the last leg (m)."""
-
-    own: Array  # (3, 3)
-    passed: Array  # (3, s)
-    length: float
-
-
-@dataclass(frozen=True, slots=True)
-class Followed:
-    """Result of following a part of a hole down."""
-
-    sums: TrajectorySums  # at its end
-    marks: list[TrajectorySums]  # after every `BLOCK` stations of the hole
-    runs: list[Array]  # (.., 3, s) shared columns of the positions, those with equally many together, if wanted
-    covs: Array  # (n, 3, 3)
-
-
 class Trajectory:
     """Positions of stations in order of depth.
 
@@ -88,24 +75,28 @@ class Trajectory:
     method : of the legs
     collar : direction at the first depth, known: vertical by default
     start_md : m
+    wander : of the path between the stations
     keeps_columns : whether every point keeps its shared columns, which of a string of fifty tubes are 750 numbers
     """
 
     def __init__(
         self,
-        method: Method = Method.BALANCED_TANGENTIAL,
+        method: Method = Method.MINIMUM_CURVATURE,
         collar: Direction | None = None,
         start_md: float = 0.0,
         *,
+        wander: LegWander = STEADY,
         keeps_columns: bool = True,
     ) -> None:
-        self._method = method
+        self.method = method
+        self._wander = wander
         self._keeps_columns = keeps_columns
         first = collar or Direction(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
         self._rows = np.zeros(FEWEST, ROW)
         self._directions: list[Direction] = []  # of the collar and every station
         self._columns: list[Packed] = []  # (2, s), of each
         self._down: list[Array] = []  # and what those come to in the vertical, (c,) of those that are kept
+        self._depths: list[StationDepth] = []
         self._insert(0, start_md, first)
         self._direct([0])
         self._kept = [UNKNOWN]  # shared columns of every point that is drawn
@@ -139,11 +130,34 @@ class Trajectory:
         return np.asarray(self._rows["position"][: len(self)])
 
     @property
+    def tangents(self) -> Array:
+        """Tangents (n, 3) at the points."""
+        return np.asarray(self._rows["tangent"][: len(self)])
+
+    @property
     def covs(self) -> Array:
         """Covariances (n, 3, 3) of the positions, m^2."""
         return np.asarray(self._rows["cov"][: len(self)])
 
-    def append(self, md: float, direction: Direction) -> TrajectoryPoint:
+    @property
+    def path_covs(self) -> Array:
+        """Covariances (n, 3, 3), m^2, that the path between the stations makes of ``covs``."""
+        return np.asarray(self._rows["path"][: len(self)])
+
+    @property
+    def depth_covs(self) -> Array:
+        """Covariances (n, 3, 3), m^2, that the own errors of depths make of ``covs``; what they share has columns."""
+        rows = self._rows[: len(self)]
+        along = rows["along"]
+        return np.asarray(rows["kinks"] + rows["depth_var"][:, None, None] * (along[:, :, None] * along[:, None]))
+
+    @property
+    def turned_back(self) -> list[float]:
+        """Depths (m) of the stations that point back against the one above: the hole is not what is drawn there."""
+        tangents = self._rows["tangent"][: len(self)]
+        return [float(md) for md in self.md[1:][(tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK]]
+
+    def append(self, md: float, direction: Direction, depth: StationDepth = EXACT) -> TrajectoryPoint:
         """Add the station at ``md`` (m).
 
         Raises
@@ -151,35 +165,47 @@ class Trajectory:
         SurveyError
             When the depth does not grow, or the two directions are opposite.
         """
-        self.extend([(md, direction)])
+        self.extend([(md, direction)], {md: depth})
         return self[-1]
 
-    def extend(self, stations: Sequence[tuple[float, Direction]]) -> None:
+    def extend(
+        self, stations: Sequence[tuple[float, Direction]], depths: Mapping[float, StationDepth] = ALL_EXACT
+    ) -> None:
         """Add stations (m, direction); the same bit for bit as one after the other, and several times as fast.
+
+        Parameters
+        ----------
+        stations : in the order of depth
+        depths : errors of their depths, by these; those that are missing are exact
 
         Raises
         ------
         SurveyError
             When a depth does not grow, or two directions are opposite; then none is added.
         """
-        depths = [float(self._rows["md"][len(self) - 1]), *(md for md, _ in stations)]
-        for before, md in itertools.pairwise(depths):
+        mds = [float(self._rows["md"][len(self) - 1]), *(md for md, _ in stations)]
+        for before, md in itertools.pairwise(mds):
             if not 0.0 < md - before < math.inf:
                 raise SurveyError(f"trajectory: expected a depth beyond {before:g} m, got {md:g} m")
+        self._check_bends(mds, [self._directions[-1], *(direction for _, direction in stations)])
         known = len(self)
         for place, (md, direction) in enumerate(stations, known):
             self._insert(place, md, direction)
+            self._depths[place] = depths.get(md, EXACT)
         self._direct(range(known, len(self)))
-        try:
-            self._draw(known)
-        except SurveyError:
-            del self._directions[known:], self._columns[known:], self._down[known:]
-            raise
+        self._draw(known)
 
-    def put(self, stations: Iterable[tuple[float, Direction]]) -> None:
+    def put(
+        self, stations: Iterable[tuple[float, Direction]], depths: Mapping[float, StationDepth] = ALL_EXACT
+    ) -> None:
         """Put stations (m, direction) between the others, or in the place of those at the same depth.
 
-        What is above the first of them stays as it is; the whole is bit for bit as one that is drawn anew.
+        What is above the first of them stays as it is; the whole is bit for bit as one that is drawn anew. Directions
+        are taken as they come: a station that turns back is told by ``turned_back``.
+
+        Parameters
+        ----------
+        depths : errors of their depths, by these; one that is missing stays as it was, which is exact at first
 
         Raises
         ------
@@ -198,10 +224,58 @@ class Trajectory:
             elif self._directions[place] is direction:
                 continue
             self._directions[place] = direction
+            self._depths[place] = depths.get(md, self._depths[place])
             changed.append(place)
         self._direct(changed)
         if changed:
             self._draw(changed[0])
+
+    def at(self, md: float) -> TrajectoryPoint:
+        """Point at a depth (m): on the arc between two stations, with its own covariance.
+
+        It is as one more station there would be whose direction is the share of the two around, and knows in addition
+        how far the path may have left the arc.
+
+        Raises
+        ------
+        SurveyError
+            When ``md`` is outside the trajectory.
+        """
+        first, last = float(self._rows["md"][0]), float(self._rows["md"][len(self) - 1])
+        if not first <= md <= last:
+            raise SurveyError(f"trajectory: expected a depth of {first:g}..{last:g} m, got {md:g} m")
+        place = int(np.searchsorted(self.md, md))
+        return self[place] if self._rows["md"][place] == md else self._between(place - 1, md)
+
+    def _between(self, k: int, md: float) -> TrajectoryPoint:
+        """Point between the station at a place and the next."""
+        upper, lower = self._rows[k], self._rows[k + 1]
+        leg = float(lower["md"] - upper["md"])
+        f = (md - float(upper["md"])) / leg
+        place, tangent = on_arc(upper["tangent"], lower["tangent"], lower["position"] - upper["position"], leg, f)
+        along = place / (f * leg)
+        sums = self._sums_at(k)
+        weights = (0.5 * (sums.length + leg * f * (2.0 - f)), 0.5 * leg * f * f)
+        by_depth = (upper["along"] - f * along, f * along)
+        shared, cov = sums.passed, sums.own + upper["kinks"] + upper["path"]
+        cov = cov + self._wander.grown(float(upper["memory"]), self._wander.moment(leg, f)) * across_of(along)
+        for row, own, weight, moved in zip((upper, lower), (k, k + 1), weights, by_depth, strict=True):
+            cov = cov + weight**2 * row["own"] + float(row["depth_var"]) * np.outer(moved, moved)
+            shared = add_shared_errors(shared, weight * self._tangent_columns(own))
+            shared = add_shared_errors(shared, moved[:, None] * self._depths[own].columns.columns())
+        return TrajectoryPoint(md, tangent, upper["position"] + place, cov + shared @ shared.T, shared)
+
+    def _sums_at(self, place: int) -> TrajectorySums:
+        """Running sums at a station."""
+        begin = place - place % BLOCK
+        mark = self._marks[begin // BLOCK]
+        return mark if begin == place else self._follow(mark, begin, place, with_columns=False).sums
+
+    def _tangent_columns(self, place: int) -> Array:
+        """Shared columns (3, s) of the tangent at a station."""
+        packed = self._columns[place]
+        values = np.concatenate([packed.values, self._down[place][None]])
+        return Packed.of_values(values, packed.places, packed.width).columns()
 
     def columns(self) -> Iterator[Array]:
         """Shared columns (n, 3, s) of the points from the collar down, some at a time, as many as were known there."""
@@ -220,20 +294,26 @@ class Trajectory:
         self._directions.insert(place, direction)
         self._columns.insert(place, NONE)
         self._down.insert(place, NOTHING)
+        self._depths.insert(place, EXACT)
 
     def _direct(self, places: Sequence[int]) -> None:
         """Compute the rows at some places that depend on their own direction alone."""
         if not places:
             return
-        directions = [self._directions[place] for place in places]
+        directions = [*map(self._directions.__getitem__, places)]
         tangents = tangents_of(directions)
         jacobians = tangent_jacobians(tangents)
+        counts, own_vars = [], []
         rows, at = self._rows, np.array(places)
         for place, direction, jacobian in zip(places, directions, jacobians, strict=True):
-            rows["own"][place], self._columns[place], self._down[place] = tangent_errors(direction, jacobian)
+            own, columns, self._down[place] = tangent_errors(direction, jacobian)
+            rows["own"][place], self._columns[place], depth = own, columns, self._depths[place]
+            width = max(columns.width, depth.columns.width)
+            counts.append((width, len(columns.places), len(depth.columns.places)))
+            own_vars.append(depth.own_var)
         rows["tangent"][at] = tangents
-        rows["width"][at] = [direction.width for direction in directions]
-        rows["count"][at] = [len(self._columns[place].places) for place in places]
+        rows["width"][at], rows["count"][at], rows["depths"][at] = np.array(counts).T
+        rows["depth_var"][at] = own_vars
 
     def _draw(self, first: int) -> None:
         """Compute the positions from a place on."""
@@ -244,15 +324,33 @@ class Trajectory:
             self._sums = self._marks[-1]
         end = len(self)
         rows = self._rows[begin:end]
-        rows["position"] = np.add.accumulate([rows["position"][0], *self._legs(rows)])
+        legs = self._legs(rows)
+        rows["position"] = np.add.accumulate(np.concatenate([rows["position"][:1], legs]))
+        more = self._go_along(rows, legs)
         followed = self._follow(self._sums, begin, end - 1, with_columns=self._keeps_columns)
-        rows["cov"][1:] = followed.covs
+        rows["cov"][1:] = followed.covs + more
         self._sums = followed.sums
         self._marks += followed.marks
         if self._keeps_columns:
             self._kept += itertools.chain.from_iterable(followed.runs)
         else:
             self._kept += [UNKNOWN] * (len(rows) - 1)
+
+    def _go_along(self, rows: npt.NDArray[np.void], legs: Array) -> Array:
+        """Compute what depths and the path between stations come to, from the first of some rows on: (n, 3, 3), m^2."""
+        from groundstation.survey.well.kernels.position_errors import (
+            follow_legs,  # reading alone needs no compiler
+        )
+
+        lengths, more = np.diff(rows["md"]), np.empty((len(legs), 3, 3))
+        alongs, memories = rows["along"].copy(), rows["memory"].copy()
+        kinks, path = rows["kinks"].copy(), rows["path"].copy()
+        follow_legs(
+            legs, lengths, rows["depth_var"].copy(), self._wander.moments(lengths), self._wander.std, alongs, memories,
+            kinks, path, more,
+        )  # fmt: skip
+        rows["along"], rows["memory"], rows["kinks"], rows["path"] = alongs, memories, kinks, path
+        return more
 
     def _follow(self, sums: TrajectorySums, begin: int, end: int, *, with_columns: bool) -> Followed:
         """Continue ``sums`` from one place to another."""
@@ -261,14 +359,19 @@ class Trajectory:
         )
 
         rows, columns = self._rows[begin : end + 1], self._columns[begin : end + 1]
+        depths = self._depths[begin : end + 1]
         known = max(sums.passed.shape[1], int(rows["width"][0]))
         widths = np.maximum(np.maximum.accumulate(rows["width"][1:]), known)
         starts = np.concatenate([FROM_ZERO, rows["count"].cumsum()])
-        places = np.concatenate([one.places for one in columns]).astype(np.intp, copy=False)
+        places = np.concatenate([*map(PLACES, columns)]).astype(np.intp, copy=False)
         lean, down = (
-            np.concatenate([one.values for one in columns], axis=1),
+            np.concatenate([*map(VALUES, columns)], axis=1),
             np.concatenate(self._down[begin : end + 1]),
         )
+        depth_starts = np.concatenate([FROM_ZERO, rows["depths"].cumsum()])
+        depth_places = np.concatenate([*map(DEPTH_PLACES, depths)]).astype(np.intp, copy=False)
+        by_depth = np.concatenate([*map(DEPTH_VALUES, depths)], axis=1)[0]
+        alongs = rows["along"][1:].copy()
         legs = np.diff(rows["md"])
         ends = 0.5 * legs
         weights = ends.copy()  # of the station before each, which has both its legs now
@@ -281,7 +384,8 @@ class Trajectory:
         passed[:, : sums.passed.shape[1]] = sums.passed
         shared, covs = np.empty((count if with_columns else 0, 3, width)), np.empty((count, 3, 3))
         add_stations(
-            weights, ends, starts, places, lean, down, rows["own"].copy(), widths, passed, own,
+            weights, ends, starts, places, lean, down, rows["own"].copy(), rows["along"][:-1] - alongs, alongs,
+            depth_starts, depth_places, by_depth, widths, passed, np.empty_like(passed), own,
             int(marked[0]) if len(marked) else count, BLOCK, marks, own_marks, shared, covs,
         )  # fmt: skip
         return Followed(
@@ -289,61 +393,33 @@ class Trajectory:
             [
                 TrajectorySums(own_marks[number].copy(), marks[number, :, : int(widths[k])].copy(), float(legs[k]))
                 for number, k in enumerate(marked.tolist())
-            ],
+            ]
+            if len(marked)
+            else [],
             runs_of(shared, widths) if with_columns else [],
             covs,
         )
 
     def _legs(self, rows: npt.NDArray[np.void]) -> Array:
         """Displacements (n, 3) from station to station."""
-        if self._method is Method.BALANCED_TANGENTIAL:
-            return np.asarray((0.5 * np.diff(rows["md"]))[:, None] * (rows["tangent"][:-1] + rows["tangent"][1:]))
-        return np.array([self._leg(*ends) for ends in itertools.pairwise(rows)])
+        upper, lower, lengths = rows["tangent"][:-1], rows["tangent"][1:], np.diff(rows["md"])
+        if self.method is Method.MINIMUM_CURVATURE:
+            return arc_displacements(lengths, upper, lower)
+        if self.method is Method.BALANCED_TANGENTIAL:
+            return np.asarray((0.5 * lengths)[:, None] * (upper + lower))
+        angles = [direction_angles(tangent[:2], float(tangent[2])) for tangent in rows["tangent"]]
+        return np.array(
+            [
+                leg_displacement(math, self.method, length, *before, *after)
+                for length, (before, after) in zip(lengths.tolist(), itertools.pairwise(angles), strict=True)
+            ]
+        )
 
-    def _leg(self, before: np.void, after: np.void) -> Array:
-        i1, a1 = direction_angles(before["tangent"][:2], float(before["tangent"][2]))
-        i2, a2 = direction_angles(after["tangent"][:2], float(after["tangent"][2]))
-        md, below = float(before["md"]), float(after["md"])
-        if self._method is Method.MINIMUM_CURVATURE and dogleg(math, i1, a1, i2, a2) > math.pi - OPPOSITE:
-            raise SurveyError(f"trajectory: the hole turns back on itself between {md:g} and {below:g} m")
-        return np.array(leg_displacement(math, self._method, below - md, i1, a1, i2, a2))
-
-
-def runs_of(shared: Array, widths: npt.NDArray[np.intp]) -> list[Array]:
-    """Parts of columns (n, 3, s) with as many columns as were known of each, those with equally many together."""
-    borders = [0, *(np.flatnonzero(np.diff(widths)) + 1).tolist(), len(widths)]
-    return [shared[a:b, :, : int(widths[a])] for a, b in itertools.pairwise(borders)]
-
-
-def interpolate_point(points: list[TrajectoryPoint], md: float) -> TrajectoryPoint:
-    """Point on the arc between two stations at ``md`` (m); its covariance is interpolated between theirs.
-
-    Raises
-    ------
-    SurveyError
-        When ``md`` is outside the trajectory.
-    """
-    if not points[0].md <= md <= points[-1].md:
-        raise SurveyError(f"trajectory: expected a depth of {points[0].md:g}..{points[-1].md:g} m, got {md:g} m")
-    for upper, lower in itertools.pairwise(points):
-        if md <= lower.md:
-            return on_arc(upper, lower, (md - upper.md) / (lower.md - upper.md))
-    return points[-1]
-
-
-def on_arc(upper: TrajectoryPoint, lower: TrajectoryPoint, f: float) -> TrajectoryPoint:
-    """Fraction ``f`` of a leg along its arc, bent evenly so that it ends where the method put the lower station."""
-    angle = math.atan2(
-        float(np.linalg.norm(np.cross(upper.tangent, lower.tangent))), float(upper.tangent @ lower.tangent)
-    )
-    if angle < 1e-9:
-        tangent = upper.tangent + f * (lower.tangent - upper.tangent)
-    else:
-        tangent = (math.sin((1.0 - f) * angle) * upper.tangent + math.sin(f * angle) * lower.tangent) / math.sin(angle)
-    half = 0.5 * (lower.md - upper.md)
-    arc = half * f * ratio_factor(math, f * angle) * (upper.tangent + tangent)
-    whole = half * ratio_factor(math, angle) * (upper.tangent + lower.tangent)
-    position = upper.position + arc + f * (lower.position - upper.position - whole)
-    cov = (1.0 - f) * upper.cov + f * lower.cov
-    shared = add_shared_errors((1.0 - f) * upper.shared, f * lower.shared)
-    return TrajectoryPoint(upper.md + f * (lower.md - upper.md), tangent, position, cov, shared)
+    def _check_bends(self, mds: Sequence[float], directions: Sequence[Direction]) -> None:
+        """Refuse legs of which minimum curvature has no arc."""
+        if self.method is not Method.MINIMUM_CURVATURE:
+            return
+        tangents = tangents_of(directions)
+        for leg in np.flatnonzero(bend_angles(tangents[:-1], tangents[1:]) > math.pi - OPPOSITE).tolist():
+            above, below = mds[leg], mds[leg + 1]
+            raise SurveyError(f"trajectory: the hole turns back on itself between {above:g} and {below:g} m")

@@ -28,6 +28,7 @@ from groundstation.survey.fusion.resolve import (
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.fusion.transport import carry_directions
 from groundstation.survey.well.ellipsoid import coverage_radius
+from groundstation.survey.well.methods import Method
 from groundstation.survey.well.trajectory import Trajectory, TrajectoryPoint
 from node.kernels.arithmetic.angles import wrap_angle
 from sim.string.direct_string import DirectString
@@ -107,7 +108,7 @@ def trajectory_errors(world: World, surveys: Sequence[StringSurvey]) -> BentRun:
     stations = fused_stations(world, surveys, shared)
     true = [hole.direction(md) for md in stations]
     collar = known_direction(*hole.direction(0.0))
-    exact = Trajectory(collar=collar)
+    exact = Trajectory(Method.BALANCED_TANGENTIAL, collar)
     exact.extend([(md, known_direction(*one)) for md, one in zip(stations, true, strict=True)])
     toe = exact.points[-1].position
     found = BentRun({}, {}, {}, {}, float(np.linalg.norm(toe - hole.position(exact.points[-1].md))))
@@ -149,7 +150,7 @@ def locate_toe(
     if told == "parallel":
         places = shared.transport_places(len(directions) + 1)
         directions = [carried.direction for carried in carry_directions(collar, directions, places)]
-    trajectory = Trajectory(collar=collar)
+    trajectory = Trajectory(Method.BALANCED_TANGENTIAL, collar)
     trajectory.extend(list(zip(stations, directions, strict=True)))
     return trajectory.points[-1], directions
 

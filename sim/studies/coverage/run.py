@@ -20,7 +20,7 @@ from groundstation.survey.fusion.fusion import StationFusion
 from groundstation.survey.fusion.resolve import resolve_direction
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.well.ellipsoid import coverage_radius
-from groundstation.survey.well.methods import station_tangents
+from groundstation.survey.well.methods import Method, station_tangents
 from groundstation.survey.well.trajectory import Trajectory
 from sim.studies.epochs import resting_string, run_seed
 from sim.studies.pool import RunAll, Step, over_cores
@@ -105,7 +105,7 @@ def drill_well(seed: int, pool: YawPool) -> tuple[Array, Array, Array]:
             stations[station].add_reading(
                 shared.direction_of(resolved, tube, above, systematic_var, rig.mount_std**2, rig.bias_std)
             )
-    trajectory = Trajectory()
+    trajectory = Trajectory(Method.BALANCED_TANGENTIAL)
     for k in range(1, TUBES + 1):
         trajectory.append(SPACING * k, stations[k].fused())
     points = trajectory.points[1:]

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from groundstation.survey.fusion.fusion import Weighting, fuse_by_scheme, sequence_weights
 from groundstation.survey.fusion.resolve import Direction
+from groundstation.survey.well.methods import Method
 from groundstation.survey.well.trajectory import Trajectory
 from sim.studies.pool import Step
 
@@ -47,7 +48,7 @@ def direction_reading(inclination_deg: float, azimuth_deg: float) -> Direction:
 def station_positions(changed: int, now: Direction, scheme: Weighting | None) -> Array:
     """Positions (5, 3) at the fourth stop by a scheme, or the true ones for None; ``changed`` is a station from 1."""
     before = direction_reading(INCLINATION_DEG, AZIMUTH_DEG)
-    trajectory = Trajectory()
+    trajectory = Trajectory(Method.BALANCED_TANGENTIAL)
     for station in range(1, STATIONS + 1):
         readings = [before] * (STATIONS - station + 1)
         if station == changed:

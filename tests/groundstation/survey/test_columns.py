@@ -289,3 +289,15 @@ def test_the_worst_of_many_deviations_is_the_worst_of_each(rows: list[tuple[floa
     assert (worst is None) == (expected is None)
     if worst is not None and expected is not None:
         assert (worst.md, worst.ratio) == (expected.md, expected.ratio)
+
+
+@given(st.floats(0.0, 1.4), st.floats(0.0, 6.28), st.floats(1.0, 60.0))
+def test_the_end_of_a_design_is_the_target_of_its_axis(inclination: float, azimuth: float, length: float) -> None:
+    design = ColumnDesign(head=(1.0, -2.0, 0.5), inclination=inclination, azimuth=azimuth, length=length)
+    end = design.end
+    there = point_deviation(point_at(end.point), design)
+    assert there.along == pytest.approx(length, abs=1e-9)
+    assert there.size == pytest.approx(0.0, abs=1e-9)
+    assert end.limit == pytest.approx(there.limit) == pytest.approx(0.05 + 0.02 * length)
+    axes = np.vstack([end.across, end.tangent])
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)

@@ -22,7 +22,7 @@ from groundstation.survey.well.methods import (
     station_tangents,
     vertical_section,
 )
-from groundstation.survey.well.trajectory import Trajectory, interpolate_point
+from groundstation.survey.well.trajectory import Trajectory
 
 DEG = math.pi / 180.0
 ARCS = [Method.MINIMUM_CURVATURE, Method.RADIUS_OF_CURVATURE]
@@ -288,7 +288,7 @@ def test_between_stations_the_interpolated_point_lies_on_the_arc(
     for row in zip(md[1:], inclination[1:], azimuth[1:], strict=True):
         trajectory.append(float(row[0]), lean_of(float(row[1]), float(row[2])))
     at = min(float(md[0] + f * (md[-1] - md[0])), float(md[-1]))  # the sum may round beyond the end
-    point = interpolate_point(trajectory.points, at)
+    point = trajectory.at(at)
     upper = max((p for p in trajectory.points if p.md <= at), key=lambda p: p.md)
     assert point.md == pytest.approx(at)
     assert np.linalg.norm(point.tangent) == pytest.approx(1.0, abs=1e-9)

@@ -22,6 +22,7 @@ from groundstation.survey.fusion.shared import (
     widen_shared_errors,
 )
 from groundstation.survey.well.ellipsoid import coverage_radius
+from groundstation.survey.well.methods import Method
 from groundstation.survey.well.trajectory import Trajectory
 
 G = 9.81
@@ -162,7 +163,8 @@ def test_the_kinds_add_up_to_the_whole(readings: list[tuple[int, list[int] | Non
     fused = fuse_by_bayes(leans)
     for shared in (leans[0].shared, leans[-1].shared, fused.shared):
         kinds = by_kind(errors, shared)
-        assert set(kinds) == {"mounts", "joints", "accelerometer_bias"}
+        assert set(kinds) == {"mounts", "joints", "accelerometer_bias", "depth"}
+        assert not kinds["depth"].any()
         whole = np.diagonal(shared @ shared.T)
         np.testing.assert_allclose(sum(kinds.values()), whole, atol=1e-12 * float(whole.sum()))
 
@@ -252,7 +254,7 @@ def surveyed(drawn: Drawn, errors: SharedErrors) -> Trajectory:
             resolved = resolve_direction(force, FORCE_STD**2 * np.eye(3), told, YAW_STD**2)
             systematic_var = MOUNT_STD**2 + (len(above) + 1) * JOINT_STD**2
             readings[station].append(errors.direction_of(resolved, tube, above, systematic_var, MOUNT_STD**2, BIAS_STD))
-    trajectory = Trajectory()
+    trajectory = Trajectory(Method.BALANCED_TANGENTIAL)  # whose Jacobian is that of the errors
     for md, found in zip(MDS, readings, strict=True):
         trajectory.append(md, fuse_by_bayes(found))
     return trajectory

@@ -16,7 +16,7 @@ from groundstation.survey.well.analysis import analyse_survey
 from groundstation.survey.well.error_sources import Site
 from groundstation.survey.well.kernels.position_errors import add_stations, warm_up
 from groundstation.survey.well.methods import Method
-from groundstation.survey.well.trajectory import BLOCK, Trajectory, interpolate_point
+from groundstation.survey.well.trajectory import BLOCK, Trajectory
 from groundstation.survey.well.well_record import SurveyRecord
 
 DEG = math.pi / 180.0
@@ -35,7 +35,7 @@ def turned(inclination: float, azimuth: float, std: float, yaw_stds: list[float]
 
 
 def test_balanced_tangential_gives_the_printed_steps_of_table_4_29() -> None:
-    trajectory = Trajectory()
+    trajectory = Trajectory(Method.BALANCED_TANGENTIAL)
     for md in (2.0, 4.0):
         trajectory.append(md, lean_of(1.0 * DEG, 120.0 * DEG))
     steps_cm = 100.0 * np.diff([p.position for p in trajectory.points], axis=0)
@@ -181,7 +181,8 @@ def test_errors_that_stations_share_add_up_and_others_do_not() -> None:
 
 
 def test_the_collar_is_known_and_a_given_one_counts_with_half_the_first_leg() -> None:
-    vertical, leaning = Trajectory(), Trajectory(collar=lean_of(0.1, 0.0, 1e-3))
+    way = Method.BALANCED_TANGENTIAL
+    vertical, leaning = Trajectory(way), Trajectory(way, lean_of(0.1, 0.0, 1e-3))
     for trajectory in (vertical, leaning):
         trajectory.append(2.0, lean_of(0.1, 0.0, 1e-3))
     assert vertical.points[-1].position[0] == pytest.approx(math.sin(0.1))
@@ -204,13 +205,13 @@ def test_interpolation_runs_on_the_arc() -> None:
     radius = 30.0
     trajectory = Trajectory(Method.MINIMUM_CURVATURE)
     trajectory.append(radius * 1.2, lean_of(1.2, 0.0))
-    point = interpolate_point(trajectory.points, radius * 0.5)
+    point = trajectory.at(radius * 0.5)
     np.testing.assert_allclose(point.position, [radius * (1.0 - math.cos(0.5)), 0.0, radius * math.sin(0.5)], atol=1e-9)
     np.testing.assert_allclose(point.tangent, [math.sin(0.5), 0.0, math.cos(0.5)], atol=1e-12)
     for end in trajectory.points:
-        np.testing.assert_allclose(interpolate_point(trajectory.points, end.md).position, end.position, atol=1e-12)
+        np.testing.assert_allclose(trajectory.at(end.md).position, end.position, atol=1e-12)
     with pytest.raises(SurveyError, match=r"0\.\.36 m"):
-        interpolate_point(trajectory.points, 40.0)
+        trajectory.at(40.0)
 
 
 @pytest.mark.parametrize("method", Method)
@@ -219,15 +220,15 @@ def test_interpolation_meets_the_stations_of_every_method(method: Method) -> Non
     for md, inclination, azimuth in [(2.0, 0.02, 1.0), (5.0, 0.3, 1.5), (9.0, 0.5, 2.5)]:
         trajectory.append(md, lean_of(inclination, azimuth))
     for end in trajectory.points:
-        np.testing.assert_allclose(interpolate_point(trajectory.points, end.md).position, end.position, atol=1e-12)
-        before, after = (interpolate_point(trajectory.points, min(max(end.md + d, 0.0), 9.0)) for d in (-1e-9, 1e-9))
+        np.testing.assert_allclose(trajectory.at(end.md).position, end.position, atol=1e-12)
+        before, after = (trajectory.at(min(max(end.md + d, 0.0), 9.0)) for d in (-1e-9, 1e-9))
         np.testing.assert_allclose(before.position, after.position, atol=1e-8)
 
 
 def test_interpolation_in_a_straight_leg_is_the_straight_line() -> None:
     trajectory = Trajectory(collar=lean_of(0.2, 1.0))
     end = trajectory.append(10.0, lean_of(0.2, 1.0))
-    point = interpolate_point(trajectory.points, 2.5)
+    point = trajectory.at(2.5)
     np.testing.assert_allclose(point.position, 0.25 * end.position, atol=1e-12)
     np.testing.assert_allclose(point.tangent, end.tangent, atol=1e-12)
 
@@ -285,7 +286,7 @@ def test_the_stations_of_the_service_and_the_record_of_the_command_have_one_regi
     tool = replace(load_tool("relay"), terms=terms)
     record = SurveyRecord(md, inclination, azimuth, list(range(len(md))), {})
     whole = analyse_survey(record, Method.BALANCED_TANGENTIAL, tool, Site())
-    trajectory = Trajectory()
+    trajectory = Trajectory(Method.BALANCED_TANGENTIAL)
     for depth, i, a in zip(md[1:].tolist(), inclination[1:].tolist(), azimuth[1:].tolist(), strict=True):
         ci, si, ca, sa = math.cos(i), math.sin(i), math.cos(a), math.sin(a)
         by_inclination, by_azimuth = np.array([ci * ca, ci * sa]), np.array([-si * sa, si * ca])

@@ -1,7 +1,6 @@
 """Walls of columns: geometry, probability of a gap, as-built centres, the worst joint and the column that closes it."""
 
 import math
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -21,8 +20,8 @@ from groundstation.survey.wall.wall_joints import (
     neighbours_in_line,
     worst_joint,
 )
+from groundstation.survey.well.arcs import on_arc
 from groundstation.survey.well.methods import Method, station_positions, station_tangents
-from groundstation.survey.well.trajectory import TrajectoryPoint, on_arc
 
 DEG = math.pi / 180.0
 RADIUS, SPACING, REQUIRED, LENGTH = 0.60, 0.75, 0.80, 30.0
@@ -225,16 +224,17 @@ def random_wells(count: int, stations: int) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def centre_on_arc(md: np.ndarray, position: np.ndarray, tangent: np.ndarray, tvd: float) -> np.ndarray:
-    points = [
-        TrajectoryPoint(float(m), t, p, np.zeros((3, 3)), np.zeros((3, 0)))
-        for m, p, t in zip(md, position, tangent, strict=True)
-    ]
-    upper, lower = next((a, b) for a, b in pairwise(points) if tvd <= b.position[2])
+    k = next(k for k, below in enumerate(position[1:]) if tvd <= below[2])
+
+    def place(share: float) -> np.ndarray:
+        ends = tangent[k], tangent[k + 1], position[k + 1] - position[k]
+        return position[k] + on_arc(*ends, float(md[k + 1] - md[k]), share)[0]
+
     low, high = 0.0, 1.0
     for _ in range(50):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if on_arc(upper, lower, middle).position[2] < tvd else (low, middle)
-    return on_arc(upper, lower, low).position[:2]
+        low, high = (middle, high) if place(middle)[2] < tvd else (low, middle)
+    return place(low)[:2]
 
 
 def in_planes(found: Cut, errors: np.ndarray) -> np.ndarray:

@@ -17,11 +17,14 @@ SOME_WORD = OneOf(*(word.value for word in Word))
 class DesignAxis:
     """Design of the column."""
 
-    inclination_deg: Annotated[float, "of the axis"]
-    azimuth_deg: Annotated[float, "of the axis"]
+    inclination_deg: Annotated[float, "of the axis at its head"]
+    azimuth_deg: Annotated[float, "of the axis at its head"]
     target_m: Annotated[float, "length of the axis"]
     radius_m: Annotated[float, "of the finished column"]
-    tolerance: Annotated[str, "preset"]
+    tolerance: Annotated[str, "preset, or the limit as a sum"]
+    course_m: Annotated[
+        list[list[float]], "points of the axis from its head to its end: length, north, east, down; two where straight"
+    ]
 
 
 @answer_class

@@ -131,7 +131,7 @@ class TrajectoryRow:
 class TrajectoryAnswer:
     """Positions with covariance."""
 
-    method: Annotated[str, "how the stations are joined", OneOf("balanced-tangential")]
+    method: Annotated[str, "how the stations are joined", OneOf("minimum-curvature")]
     points: list[TrajectoryRow]
 
 

@@ -4,7 +4,8 @@ A station that another one follows counts with both of its legs from then on, th
 
     C_K = sum_{k<K} R_k + R*_K + (sum_{k<K} e_k + e*_K) (sum_{k<K} e_k + e*_K)^T
 
-so two running sums are all that is kept. Source: thesis eqs. I.1-I.12. Frame: north, east, down; m.
+and an error of its depth moves it along the leg above, tau_K, and what is below by the kink there, tau_k - tau_(k+1).
+So two running sums are all that is kept. Source: thesis eqs. I.1-I.12. Frame: north, east, down; m.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ Places = npt.NDArray[np.intp]
 
 @kernel
 def add_stations(
-    weights: Array, ends: Array, starts: Places, places: Places, lean: Array, down: Array, covs: Array, widths: Places,
-    passed: Array, own: Array, first: int, every: int, marks: Array, own_marks: Array, shared: Array, out: Array,
+    weights: Array, ends: Array, starts: Places, places: Places, lean: Array, down: Array, covs: Array, kinks: Array,
+    alongs: Array, depth_starts: Places, depth_places: Places, depths: Array, widths: Places, passed: Array,
+    here: Array, own: Array, first: int, every: int, marks: Array, own_marks: Array, shared: Array, out: Array,
 ) -> None:  # fmt: skip
     """Go on down a hole from the station where the sums end.
 
@@ -32,8 +34,13 @@ def add_stations(
         columns from ``starts[k]`` to before ``starts[k + 1]`` are its change, level and vertical, for one standard
         deviation of the shared errors at these places, and all others do not change it
     covs : (n + 1, 3, 3), of the same tangents: the covariance that is its own
+    kinks, alongs : (n, 3), of the station before each: by how much a metre of its depth moves what is below it; of
+        each: by how much a metre of its depth moves itself
+    depth_starts, depth_places, depths : (n + 2,), (d,) and (d,) m, of every depth from the station before on: the same
+        as of the tangents
     widths : (n,), how many shared errors are known at each position
     passed, own : (3, s) and (3, 3), the running sums e and R; they go on with every station but the last
+    here : (3, s), to work in
     first, every, marks, own_marks : the sums after the station ``first``, and after every so many from there, are put
         into (m, 3, s) and (m, 3, 3)
     shared : (n, 3, s) m, set: columns e + e* of every position; zero rows where they are not wanted
@@ -47,17 +54,25 @@ def add_stations(
             passed[0, s] += weight * lean[0, c]
             passed[1, s] += weight * lean[1, c]
             passed[2, s] += weight * down[c]
+        for c in range(depth_starts[k], depth_starts[k + 1]):
+            s = depth_places[c]
+            for i in range(3):
+                passed[i, s] += kinks[k, i] * depths[c]
+        here[:] = passed
+        for c in range(starts[k + 1], starts[k + 2]):
+            s = places[c]
+            here[0, s] += end * lean[0, c]
+            here[1, s] += end * lean[1, c]
+            here[2, s] += end * down[c]
+        for c in range(depth_starts[k + 1], depth_starts[k + 2]):
+            s = depth_places[c]
+            for i in range(3):
+                here[i, s] += alongs[k, i] * depths[c]
+        if len(shared) > 0:
+            shared[k] = here
         nn = ne = nd = ee = ed = dd = 0.0
-        c, last = starts[k + 1], starts[k + 2]
         for s in range(widths[k]):
-            n, e, d = passed[0, s], passed[1, s], passed[2, s]
-            if c < last and places[c] == s:
-                n += end * lean[0, c]
-                e += end * lean[1, c]
-                d += end * down[c]
-                c += 1
-            if len(shared) > 0:
-                shared[k, 0, s], shared[k, 1, s], shared[k, 2, s] = n, e, d
+            n, e, d = here[0, s], here[1, s], here[2, s]
             nn += n * n
             ne += n * e
             nd += n * d
@@ -74,11 +89,53 @@ def add_stations(
             mark += 1
 
 
+@kernel
+def follow_legs(
+    legs: Array, lengths: Array, depth_vars: Array, moments: Array, std: float, alongs: Array, memories: Array,
+    kinks: Array, path: Array, more: Array,
+) -> None:  # fmt: skip
+    """Go on down a hole with what its depths err by themselves, and what its path does between stations.
+
+    See ``groundstation.survey.path.leg_wander``. The first row of what is set is that of the station before, known.
+
+    Parameters
+    ----------
+    legs, lengths : (n, 3) and (n,) m, displacements and lengths
+    depth_vars : (n + 1,) m^2, of the depths of the station before and of all below, that no other shares
+    moments : (n, 4), of every leg: v, b, a and what is kept of a curvature
+    std : rad/m, of the curvature
+    alongs : (n + 1, 3), set: displacement of the leg above each for a metre of it
+    memories : (n + 1,), set: c of the leg below each
+    kinks, path : (n + 1, 3, 3) m^2, set: what the own errors of the depths above, and the path above come to
+    more : (n, 3, 3) m^2, set: both, with the own error of the depth of each
+    """
+    for k in range(len(lengths)):
+        size = 0.0
+        for i in range(3):
+            alongs[k + 1, i] = legs[k, i] / lengths[k]
+            size += alongs[k + 1, i] * alongs[k + 1, i]
+        grown = std * std * max(moments[k, 0] + 2.0 * moments[k, 1] * memories[k], 0.0)
+        memories[k + 1] = moments[k, 3] * memories[k] + moments[k, 2]
+        for i in range(3):
+            bent = alongs[k, i] - alongs[k + 1, i]
+            for j in range(3):
+                both = alongs[k + 1, i] * alongs[k + 1, j]
+                across = (1.0 if i == j else 0.0) - (both / size if size > 0.0 else 0.0)
+                kinks[k + 1, i, j] = kinks[k, i, j] + depth_vars[k] * bent * (alongs[k, j] - alongs[k + 1, j])
+                path[k + 1, i, j] = path[k, i, j] + grown * across
+                more[k, i, j] = kinks[k + 1, i, j] + path[k + 1, i, j] + depth_vars[k + 1] * both
+
+
 def warm_up() -> None:
     """Compile the loop or load it from the cache, so that the first survey does not wait for it."""
     starts, places = np.array([0, 0, 1]), np.zeros(1, np.intp)
     add_stations(
-        np.ones(1), np.ones(1), starts, places, np.zeros((2, 1)), np.zeros(1), np.zeros((2, 3, 3)), np.ones(1, np.intp),
-        np.zeros((3, 1)), np.zeros((3, 3)), 0, 1, np.empty((1, 3, 1)), np.empty((1, 3, 3)), np.empty((0, 3, 1)),
-        np.empty((1, 3, 3)),
+        np.ones(1), np.ones(1), starts, places, np.zeros((2, 1)), np.zeros(1), np.zeros((2, 3, 3)), np.zeros((1, 3)),
+        np.zeros((1, 3)), np.zeros(3, np.intp), places[:0], np.zeros(0), np.ones(1, np.intp),
+        np.zeros((3, 1)), np.zeros((3, 1)), np.zeros((3, 3)), 0, 1, np.empty((1, 3, 1)), np.empty((1, 3, 3)),
+        np.empty((0, 3, 1)), np.empty((1, 3, 3)),
+    )  # fmt: skip
+    follow_legs(
+        np.ones((1, 3)), np.ones(1), np.zeros(2), np.zeros((1, 4)), 0.0, np.zeros((2, 3)), np.zeros(2),
+        np.zeros((2, 3, 3)), np.zeros((2, 3, 3)), np.empty((1, 3, 3)),
     )  # fmt: skip

@@ -244,7 +244,7 @@ export interface TrajectoryRow {
 /** Positions with covariance. */
 export interface TrajectoryAnswer {
   /** how the stations are joined */
-  method: "balanced-tangential";
+  method: "minimum-curvature";
   points: TrajectoryRow[];
 }
 
@@ -440,16 +440,18 @@ export interface AdjustmentAnswer {
 
 /** Design of the column. */
 export interface DesignAxis {
-  /** of the axis */
+  /** of the axis at its head */
   inclination_deg: number;
-  /** of the axis */
+  /** of the axis at its head */
   azimuth_deg: number;
   /** length of the axis */
   target_m: number;
   /** of the finished column */
   radius_m: number;
-  /** preset */
+  /** preset, or the limit as a sum */
   tolerance: string;
+  /** points of the axis from its head to its end: length, north, east, down; two where straight */
+  course_m: number[][];
 }
 
 /** Deviation of the hole from the design axis at one depth. */
