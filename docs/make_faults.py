@@ -13,6 +13,7 @@ from make_tables import table  # noqa: E402
 
 from borechain.gauntlet.gauntlet_rig import LOOK_EVERY  # noqa: E402
 from borechain.gauntlet.gauntlet_run import SeedOutcome, run_seed  # noqa: E402
+from sim.gauntlet.expected_doubts import EXPECTED  # noqa: E402
 from sim.gauntlet.fault_kinds import ANSWERS, KINDS, FaultKind  # noqa: E402
 
 SEEDS = 4
@@ -26,7 +27,8 @@ takes one survey with each tube. The columns:
 * alarms that the crew saw after the fault began, and the latest time of each
   ([what they mean](operate.md#what-the-crew-is-told), looked at every {every:.0f} s); a kind without an alarm is made
   good by repetition;
-* the time within which everything that can be repaired is, and the crew knows what was lost.
+* the time within which everything that can be repaired is, and the crew knows what was lost; of a deception, which
+  nothing contradicts but the other tubes, what it makes wrong.
 
 Made by `python docs/make_faults.py`.
 
@@ -39,7 +41,8 @@ def row_of(kind: FaultKind, outcomes: list[SeedOutcome]) -> tuple[str, ...]:
     told = ", ".join(f"`{code}` {math.ceil(s)} s" for code, s in sorted(times.items()))
     surveys = ", ".join(str(outcome.measurements) for outcome in outcomes)
     wrong = "; ".join(sorted({text for outcome in outcomes for text in outcome.violations})) or "nothing"
-    return f"`{kind.name}`", kind.meaning, ANSWERS[kind.name], surveys, told or "none", f"{kind.recovery:.0f} s", wrong
+    well = f"{EXPECTED[kind.name].misleads} wrong to the end" if kind.name in EXPECTED else f"{kind.recovery:.0f} s"
+    return f"`{kind.name}`", kind.meaning, ANSWERS[kind.name], surveys, told or "none", well, wrong
 
 
 def page(seeds: int) -> str:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from borechain.drilling.inline import InlineRig
 from groundstation.service.process.ground_process import GroundProcess
 from node.process.tube_process import TubeProcess
+from sim.errors import RigError
 from sim.gauntlet.fault import EVERYBODY, Step
 from sim.gauntlet.faulty_channel import FaultyChannel
 from sim.gauntlet.faulty_disk import FaultyDisk
@@ -152,6 +153,16 @@ class GauntletRig:
         """Publish bytes on the key of the depth."""
         if self.ground is not None:
             self.ground.on_depth(payload, self.world.local_clock(BASE, self.now))
+
+    def order(self, name: str, parameters: dict[str, str]) -> bool:
+        """Have the crew order something; returns whether the ground station obeyed."""
+        if self.ground is None:
+            return False
+        try:
+            self.inline.command(name, parameters)
+        except RigError:
+            return False  # a disk that refuses, or what it was told cannot be now
+        return True
 
     def drill(self, steps: Iterable[Step], observe: Callable[[], None] = lambda: None) -> None:
         """Drill to the end with each step at its time; ``observe`` is called from time to time."""

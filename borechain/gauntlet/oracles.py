@@ -11,6 +11,7 @@ import msgpack
 
 from borechain.gauntlet.gauntlet_rig import GauntletRig
 from groundstation.service.hole.surveyed_hole import SurveyedHole
+from sim.gauntlet.expected_doubts import misled_by
 from sim.gauntlet.fault import TUBES
 from sim.gauntlet.faulty_world import TUBE_LENGTH, FaultyWorld
 from sim.rig.report import wrap_deg
@@ -32,6 +33,7 @@ TOLD = frozenset(
 DEPTH = frozenset({"depth_refused", "depth_contradicts"})  # alarms while which no depth since a gap is sure
 YAW = frozenset({"reference", "joint"})  # alarms while which no yaw is sure, where encoder or sensors have failed
 RECEIPT = msgpack.packb({"k": int(MessageKind.RECEIPT)})[1:]  # in every frame with a receipt
+SURELY_FOUND = 2.0  # times the smallest blunder that is stated to be found
 UNKNOWN_DEG = 20.0  # of an azimuth whose yaws are all unknown, at least
 
 
@@ -144,19 +146,24 @@ def find_violations(
     """Every oracle that does not hold at the end, in words; ``seen`` are the alarms that the crew saw meanwhile.
 
     Where the encoder cannot be judged, its failure showing in nothing that measures, directions are not; where the
-    depth cannot, neither is what it places and what it says is missing. Events are
-    not sent again, so an alarm that rests on them is lost with a database that is deleted or replaced under a
-    crew that has seen it.
+    depth cannot, neither is what it places and what it says is missing. Likewise of what a deception makes wrong, see
+    ``sim.gauntlet.expected_doubts``. Events are not sent again, so an alarm that rests on them is lost with a database
+    that is deleted or replaced under a crew that has seen it.
     """
     shown = rig.inline.ask("alarms")
     standing = {row["code"] for row in shown["rig"]}
     warned = standing | (set(seen) if rig.disk(BASE).handled else set())
     told = standing | {row["code"] for row in shown["rig_cleared"]}
     rows = rig.inline.ask("measurements")["measurements"]
+    misled = misled_by(rig.world.deceptions)
+    depth_can_be_judged = depth_can_be_judged and "depth" not in misled
+    is_bent = encoder_can_be_judged and "direction" in misled and not warned & YAW
+    encoder_can_be_judged = encoder_can_be_judged and not misled & {"direction", "north"}
     return [
         *_each_once(rows),
         *(() if standing & DEPTH or not depth_can_be_judged else _depths(rows, rig.world)),
         *(() if _is_told(rig.world, warned) or not encoder_can_be_judged else _directions(rig)),
+        *(_beyond_reliability(rig) if is_bent else ()),
         *_flags(rig.inline.ground.model.hole),
         *(_missing(rows, rig, standing | (told & {"depth_refused"})) if depth_can_be_judged else ()),
         *_health(rig.inline.ask("status")["health"], standing),
@@ -210,6 +217,29 @@ def _directions(rig: GauntletRig) -> Iterator[str]:
             yield f"station at {station['md_m']:.2f} m is {size:.1f} sigmas from the truth"
 
 
+def _beyond_reliability(rig: GauntletRig) -> Iterator[str]:
+    """Directions that a deception has bent by more than what is stated to be found, without a word of it.
+
+    A blunder of the smallest size that is stated is found four times in five, one of twice that size always.
+    """
+    found, verdict = rig.inline.ask("adjustment"), rig.inline.ask("verdict")
+    if found["blunders"] or set(verdict["doubts"]) - {"setup"}:
+        return
+    steps = [row["smallest_step_mg"] for row in found["tubes"]]
+    if not steps or None in steps:
+        return  # it is said that nothing can tell
+    for station in rig.inline.ask("stations")["stations"]:
+        off_mg = 1e3 * math.sin(_angle_off(station, rig.world.truth_station(station["md_m"])))
+        if off_mg > SURELY_FOUND * max(steps):
+            yield f"station at {station['md_m']:.2f} m is off by {off_mg:.0f} mg, {max(steps):.0f} are said to be found"
+
+
+def _angle_off(one: dict[str, Any], other: dict[str, Any]) -> float:
+    """Angle (rad) between two directions."""
+    (i, a), (j, b) = ((math.radians(row["inclination_deg"]), math.radians(row["azimuth_deg"])) for row in (one, other))
+    return math.acos(min(math.cos(i) * math.cos(j) + math.sin(i) * math.sin(j) * math.cos(a - b), 1.0))
+
+
 def _flags(hole: SurveyedHole) -> Iterator[str]:
     """Violations of the flags' effects: a faulty sensor's survey is not fused, an unknown yaw gives no azimuth."""
     for station in hole.stations:
@@ -237,7 +267,7 @@ def _missing(rows: list[dict[str, Any]], rig: GauntletRig, standing: set[str]) -
 
 def _rests(world: FaultyWorld) -> list[tuple[int, float]]:
     """Tube and its depth (m) in every rest of the schedule; a string rests too while a tube is added."""
-    return _nodes([(phase.tube, world.true_depth(phase.start)) for phase in world.phases if phase.kind != "drill"])
+    return _nodes([(phase.tube, world.bit_depth(phase.start)) for phase in world.phases if phase.kind != "drill"])
 
 
 def _expected(rig: GauntletRig) -> list[tuple[int, float]]:
@@ -247,7 +277,7 @@ def _expected(rig: GauntletRig) -> list[tuple[int, float]]:
     has stood: it counts what it has heard, and tells the crew later. A survey taken after the newest reading of the
     depth is placed by the next.
     """
-    stops = [(phase.tube, rig.world.true_depth(phase.end)) for phase in rig.world.phases if phase.kind == "stop"]
+    stops = [(phase.tube, rig.world.bit_depth(phase.end)) for phase in rig.world.phases if phase.kind == "stop"]
     ground = rig.inline.ground
     string, waiting = ground.model.string, ground.model.placement.waiting
     due, epoch = ground.config.survey_after + LATE, string.time.epoch
@@ -255,7 +285,7 @@ def _expected(rig: GauntletRig) -> list[tuple[int, float]]:
     owed = _nodes([stop for stop in stops if not any(abs(stop[1] - md) <= DEPTH_TOLERANCE for md in waits)])
     heard = max((stand.ended_at for stand in string.depths.stands if stand.epoch == epoch), default=math.inf)
     late = {one.message.tube for one in waiting if one.message.station_at > heard}
-    coming = [one for one in _nodes([(max(late, default=0), rig.world.true_depth(rig.world.end))]) if one[0] in late]
+    coming = [one for one in _nodes([(max(late, default=0), rig.world.bit_depth(rig.world.end))]) if one[0] in late]
     return [one for one in owed if not _is_among(one, coming)]
 
 

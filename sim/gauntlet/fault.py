@@ -52,6 +52,9 @@ class Faulty(Protocol):
     def send_depth(self, payload: bytes) -> None:
         """Publish bytes on the key of the depth."""
 
+    def order(self, name: str, parameters: dict[str, str]) -> bool:
+        """Have the crew order something; returns whether the ground station obeyed."""
+
 
 Act = Callable[[Faulty], None]
 

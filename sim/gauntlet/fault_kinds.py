@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from sim.gauntlet import hostile, joint_faults, power, readings
+from sim.gauntlet import deceptions, hostile, joint_faults, power, readings
+from sim.gauntlet.expected_doubts import EXPECTED
 from sim.gauntlet.fault import TUBES, FaultKind, momentary_fault
 from telemetry.messages import BASE, ENCODER
 
@@ -89,8 +90,31 @@ KINDS: tuple[FaultKind, ...] = (
     FaultKind("replay", "recorded frames come again", momentary_fault(hostile.replay_frames)),
     FaultKind("splice", "payloads of recorded frames come in other frames", momentary_fault(hostile.splice_frames)),
     FaultKind("second-ground", "a second base station speaks to the encoder", hostile.second_ground),
+    *(
+        FaultKind(name, meaning, deceptions.deceive_from(name, act))
+        for name, meaning, act in (
+            ("force-step", "an accelerometer steps by 5 to 50 mg", deceptions.force_step),
+            ("force-creep", "an accelerometer creeps by 0.1 to 0.5 mg/s", deceptions.force_creep),
+            ("mount-slips", "the mount of a tube leans over by up to 3 deg and turns", deceptions.mount_slips),
+            ("axes-exchanged", "the axes x and y of a tube's sensors are exchanged", deceptions.axes_exchanged),
+            ("tubes-exchanged", "two tubes have each other's calibration", deceptions.calibrations_exchanged),
+            ("hole-moves", "the hole leans over by 0.2 to 2 deg", deceptions.hole_moves),
+            ("depth-scale", "the depth counts 5 to 20 % too much or too little", deceptions.depth_scale),
+            ("depth-stuck", "the depth follows the bit no more", deceptions.depth_stuck),
+        )
+    ),
+    FaultKind("joint-misread", "a mark of the top tube is told wrong by 3 to 30 deg", deceptions.joint_misread),
+    *(
+        FaultKind(name, meaning, deceptions.tell_wrongly(name, parameters_of))
+        for name, meaning, parameters_of in (
+            ("north-wrong", "north is told wrong by 5 to 120 deg", deceptions.north_wrong),
+            ("collar-wrong", "the collar is told to lean by up to 10 deg", deceptions.collar_wrong),
+            ("length-wrong", "a tube is told to be 0.1 to 0.5 m longer than it is", deceptions.length_wrong),
+        )
+    ),
 )
 KIND_OF = {kind.name: kind for kind in KINDS}
+LASTING = frozenset({"encoder-slips", *EXPECTED})  # that no repair of a crew takes back
 ANSWERS: dict[str, str] = {
     "node-cut": "it continues from its saved state and repeats its messages until they are receipted",
     "encoder-cut": "a new epoch of rig time; the nodes compare clocks again",
@@ -146,4 +170,4 @@ ANSWERS: dict[str, str] = {
     "replay": "each number is taken once; an old state is not a sign of life",
     "splice": "the same",
     "second-ground": "the link begins a new session each time; what was on its way is repeated",
-}
+} | {name: expected.answer for name, expected in EXPECTED.items()}

@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
+from node.firmware.tube_settings import MakeUpAngle, TubeSettings
+from node.kernels.arithmetic.formats import PERIOD
+from sim.world.borehole import Borehole
 from sim.world.scenario import Scenario, scenario_of
+from sim.world.truth import lean_rotation
 from sim.world.world import World
 from telemetry.messages import ENCODER
 
@@ -47,11 +56,14 @@ class FaultyWorld(World):
     stuck_at : rig time (s) from which on the encoder counts no more, None where it does
     depth_error : m
     depth_hidden : no depth is measured
+    deceptions : names of faults that nothing contradicts but the other tubes, at any time
+    misread : rad by which the joints of a tube to head and lower tube are told wrong, by tube
     """
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
         super().__init__(scenario, seed)
         self._depths: dict[float, float] = {}
+        self._measured: dict[float, float] = {}  # m, of a rig without faults
         self._counted: dict[float, EncoderSample] = {}
         self._heal()
 
@@ -69,6 +81,7 @@ class FaultyWorld(World):
     def forget(self) -> None:
         """Drop computed values of times that will not come again."""
         self._depths.clear()
+        self._measured.clear()
         self._counted.clear()
 
     def _heal(self) -> None:
@@ -81,6 +94,55 @@ class FaultyWorld(World):
         self.stuck_at: float | None = None
         self.depth_error = 0.0
         self.depth_hidden = False
+        self.deceptions: set[str] = set()
+        self.misread: dict[int, tuple[float, float]] = {}
+        self._deceivers: dict[int, list[Callable[[Reading], Reading]]] = {}
+        self._scales: list[tuple[float, float]] = []  # depth of the bit, m, from which on it counts so much more
+        self._leaned: Borehole | None = None
+
+    def add_deceiver(self, tube: int, change: Callable[[Reading], Reading]) -> None:
+        """Have a tube's readings changed from now on, in a way that its node cannot see."""
+        self._deceivers.setdefault(tube, []).append(change)
+
+    def scale_depth(self, scale: float, t: float) -> None:
+        """Have the measured depth count ``scale`` more of what the bit advances after the rig time ``t`` (s)."""
+        self._scales.append((self.bit_depth(t), scale))
+
+    def lean_hole(self, lean: npt.NDArray[np.float64]) -> None:
+        """Have the whole hole lean over by ``lean`` (2,) rad to north and east; its tubes stand in it."""
+        before = self._hole_now.tangent(np.zeros(1))[0][0]
+        north, east = (before[:2] + before[2] * lean).tolist()
+        inclination, azimuth = math.atan2(math.hypot(north, east), before[2]), math.atan2(east, north)
+        self._leaned = Borehole.straight(inclination, azimuth, self.scenario.hole.length)
+
+    @property
+    def _hole_now(self) -> Borehole:
+        return self.scenario.hole if self._leaned is None else self._leaned
+
+    def truth_station(self, md: float) -> dict[str, float]:
+        """Direction and position of the hole at one depth (m), as it is now; degrees and metres."""
+        if self._leaned is None:
+            return super().truth_station(md)
+        inclination, azimuth = self._leaned.direction(md)
+        north, east, tvd = self._leaned.position(md).tolist()
+        return {
+            "md_m": md,
+            "inclination_deg": math.degrees(inclination),
+            "azimuth_deg": math.degrees(azimuth),
+            "north_m": north,
+            "east_m": east,
+            "tvd_m": tvd,
+        }
+
+    def tube_settings(self, tube: int) -> TubeSettings:
+        """What the crew enters for a tube that is switched on now."""
+        settings = super().tube_settings(tube)
+        drive, lower = self.misread.get(tube, (0.0, 0.0))
+        return replace(
+            settings,
+            drive_joint=MakeUpAngle(settings.drive_joint.angle + drive, settings.drive_joint.std),
+            lower_joint=MakeUpAngle(settings.lower_joint.angle + lower, settings.lower_joint.std),
+        )
 
     def let_drift(self, address: int, t: float, rate: float) -> None:
         """Let the clock of a process run fast by ``rate`` s/s from rig time ``t`` (s) of the truth on.
@@ -122,17 +184,34 @@ class FaultyWorld(World):
     def imu_sample(self, tube: int, cycle: int) -> Reading:
         """Reading of a tube, spoiled where its sensor fails."""
         reading = super().imu_sample(tube, cycle)
+        if self._leaned is not None:
+            reading = self._in_leaned_hole(reading, tube, cycle)
+        for change in self._deceivers.get(tube, ()):
+            reading = change(reading)
         if tube not in self.spoilers:
             return reading
         self.spoiled = True
         return self.spoilers[tube](reading)
 
-    def bit_depth(self, t: float) -> float:
+    def measured_depth(self, t: float) -> float:
         """Depth of the bit as the rig measures it, m."""
-        return max(self.true_depth(t) + self.depth_error, 0.0)
+        if t not in self._measured:
+            self._measured[t] = super().measured_depth(t)
+        counted = sum(scale * max(self.bit_depth(t) - since, 0.0) for since, scale in self._scales)
+        return max(self._measured[t] + counted + self.depth_error, 0.0)
 
-    def true_depth(self, t: float) -> float:
-        """Depth of the bit, m."""
+    def bit_depth(self, t: float) -> float:
+        """Depth of the bit along the hole, m."""
         if t not in self._depths:
             self._depths[t] = super().bit_depth(t)
         return self._depths[t]
+
+    def _in_leaned_hole(self, reading: Reading, tube: int, cycle: int) -> Reading:
+        """What a tube reads that stands in the hole as it leans now, of what it would have read before."""
+        yaw = self.yaw_truth(tube, self.cycle_end(cycle) + self.phase(tube) - 0.5 * PERIOD)
+        c, s = math.cos(yaw), math.sin(yaw)
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        before, now = (hole.tangent(np.zeros(1))[0] for hole in (self.scenario.hole, self._hole_now))
+        change = (lean_rotation(now)[0] @ turn).T @ lean_rotation(before)[0] @ turn
+        rate, force = change @ np.array(reading[:3]), change @ np.array(reading[3:6])
+        return [*rate.tolist(), *force.tolist(), *reading[6:]]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from sim.world.scenario_file import EXACTLY_DEG
 
 if TYPE_CHECKING:
@@ -39,9 +41,9 @@ def plan_settings(world: World) -> dict[str, Any]:
 
 
 def told_settings(world: World) -> dict[str, Any]:
-    """What the crew tells of the rig: it knows the truth as well as it states, but for what it does not tell."""
+    """What the crew tells of the rig: the truth, but for what it tells wrongly or does not tell."""
     told = world.scenario.file.setup
-    inclination, azimuth = world.scenario.hole.direction(0.0)
+    inclination, azimuth = told_collar(world)
     by_name = {
         "north": {"north_std_deg": told.north_std_deg},
         "collar": {
@@ -52,3 +54,13 @@ def told_settings(world: World) -> dict[str, Any]:
         "mounts": {"mount_tilt_std_deg": max(world.scenario.file.joints.mount_tilt_std_deg, EXACTLY_DEG)},
     }
     return {key: value for name, told_ in by_name.items() if name not in told.untold for key, value in told_.items()}
+
+
+def told_collar(world: World) -> tuple[float, float]:
+    """Inclination and azimuth (rad) of the collar as the crew tells them."""
+    hole, wrong = world.scenario.hole, world.scenario.file.told
+    if wrong.collar_north_deg == wrong.collar_east_deg == 0.0:
+        return hole.direction(0.0)
+    off = np.radians([wrong.collar_north_deg, wrong.collar_east_deg, 0.0])
+    north, east, down = (hole.tangent(np.zeros(1))[0][0] + off).tolist()
+    return math.atan2(math.hypot(north, east), down), math.atan2(east, north)

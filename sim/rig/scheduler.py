@@ -333,7 +333,7 @@ class Scheduler:
     ) -> None:
         if at >= self.world.motion.begin:  # in the rack there is no bit
             rig_time = self.world.local_clock(ENCODER, at)
-            depth = encode_message(self._depth.measure(rig_time, max(self.world.bit_depth(at), 0.0)))
+            depth = encode_message(self._depth.measure(rig_time, max(self.world.measured_depth(at), 0.0)))
             self._add(steps, true_time, BASE, Due.DEPTH, at, self._seal_depth(depth), b"")
         self._add(steps, true_time, BASE, Due.TIMER, at, None, b"")
         for address in self.stepper.alive():

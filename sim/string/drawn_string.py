@@ -76,6 +76,7 @@ class DrawnString:
         self.turning = np.array([p.kind == "drill" for p in phases])
         self._head, self._tops = still.drive(world.ends)[0], world.motion.tops(world.ends).astype(np.int64)
         self._depth = world.motion.depth(world.ends)[0]
+        self._below = np.array([world.below(tube) for tube in range(1, scenario.tubes + 1)])
         self._shared, self._hop_noise = make_shared(scenario.file), hop_noise_of(scenario.file)
         self._epoch_of = np.full(world.cycles, -1)
         self._epoch_of[self.epochs] = np.arange(len(self.epochs))
@@ -93,7 +94,8 @@ class DrawnString:
         given = *loop, nodes, schedule, draw_hops(world), np.zeros(count), new_memory(), 0, world.cycles
         field = None if rough is None else rough.field
         drill_string(*given, drawn=self.new_readings(world), field=field, log=log)
-        systematic = np.array([np.pad(world.marks.errors(tube), (tube, 0), "edge") for tube in range(1, count + 1)])
+        errors = [world.marks.errors(tube) - self.scenario.file.told.north for tube in range(1, count + 1)]
+        systematic = np.array([np.pad(error, (tube, 0), "edge") for tube, error in enumerate(errors, 1)])
         return DrawnRun(schedule, log.surveys[: int(log.made[0])], log.states, frames_of(world), systematic, rough)
 
     def redraw(self, world: World) -> tuple[StringSchedule, FieldRun | None]:
@@ -118,8 +120,8 @@ class DrawnString:
         )
 
     def depths(self, place: Indices, cycle: Indices) -> Array:
-        """Measured depths (n,) m of nodes at the ends of cycles."""
-        return np.asarray(self._depth[cycle] - place * self.scenario.tube_length)
+        """True depths (n,) m along the hole of nodes at the ends of cycles."""
+        return np.asarray(self._depth[cycle] - self._below[place])
 
     def yaw_errors(self, run: DrawnRun, place: Indices, cycle: Indices, yaw: Array) -> tuple[Array, Array]:
         """Errors of yaws (n,) rad, whole and constant part."""

@@ -92,7 +92,7 @@ def measure_samples(world: World, samples: Array, edges_before: Callable[[int], 
 
 def measure_counts(world: World, encoder: PlainEncoder) -> Array:
     """What an encoder without times of its edges measures, (cycles, AIDING)."""
-    heads = world.motion.drive(world.ends)[0].tolist()
+    heads = (world.motion.drive(world.ends)[0] - world.scenario.file.told.north).tolist()
     measured = [encoder.on_cycle(head, end) for head, end in zip(heads, world.ends.tolist(), strict=True)]
     return renumber_measurements(world, np.array([row_of_aiding(aiding) for aiding in measured]))
 

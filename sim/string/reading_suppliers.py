@@ -100,7 +100,7 @@ def felt_by(scenario: Scenario, motion: Motion, ends: Array) -> FeltTruth:
     turns = (motion.drive(ends)[1] > 0.0) | (motion.drive(ends - PERIOD)[1] > 0.0)
     if scenario.file.rough is not None:
         return FeltTruth(np.zeros((0, count, 3)), np.zeros((0, count, 3)), np.zeros((0, 2)), turns.astype(float))
-    depths = (k * scenario.tube_length for k in range(count))
+    depths = (scenario.file.told.below(tube, scenario.tube_length) for tube in range(1, count + 1))
     truths = [TubeTruth(scenario.hole, motion, depth, 0.0, 0.0, a.gravity_mps2) for depth in depths]
     rates, forces = zip(*(truth.cycle_means(ends, PERIOD) for truth in truths), strict=True)
     around = TubeTruth(scenario.hole, motion, 0.0, 0.0, a.radius_m, a.gravity_mps2)

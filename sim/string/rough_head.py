@@ -28,7 +28,7 @@ def measured_in_field(world: World, section: RoughEncoderSection, t: Array, head
     t, head : (n,) s and rad, grid of rig time and angle of the head
     """
     seed, ends, even = world.seed, world.ends, section.model_copy(update={"outliers": 0.0})
-    disc = RoughDisc(even, t, head, world.begin, world.disc.errors, seed)
+    disc = RoughDisc(even, t, head, world.begin, world.disc.errors, seed, zero=world.scenario.file.told.north)
     samples = np.zeros((len(ends), SAMPLE))
     samples[:, NOW], samples[:, TIMED] = ends, 1.0
     samples[:, [COUNT, EDGE_AT, RISING]] = disc.samples(ends)

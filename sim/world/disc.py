@@ -24,6 +24,7 @@ class Disc:
     edge_std : rad, error of a line's place, constant for every line
     random : stream of the places
     turned_at, turned_by : (k,) s and rad >= 0, jumps of the head while it is free of the string
+    zero : rad, angle of the head at which its count is 0
 
     Attributes
     ----------
@@ -38,8 +39,10 @@ class Disc:
         random: np.random.Generator,
         turned_at: Sequence[float] = (),
         turned_by: Sequence[float] = (),
+        *,
+        zero: float = 0.0,
     ) -> None:
-        self._motion = motion
+        self._motion, self._zero = motion, zero
         self._times: dict[int, float] = {}  # s, of the last edges, by their count
         self._jumps = tuple(zip(turned_at, turned_by, strict=True))
         self._quantum = math.tau / counts_per_turn
@@ -65,7 +68,7 @@ class Disc:
         """
         if angle is None:
             angle = float(self.angles(np.array([t]))[0])
-        count = math.floor(angle / self._quantum + 0.5)
+        count = math.floor((angle - self._zero) / self._quantum + 0.5)
         if self._place(count) > angle:
             count -= 1
         wanted = range(count, count - EDGES, -1)
@@ -78,7 +81,7 @@ class Disc:
     def counts(self, t: Array) -> npt.NDArray[np.int64]:
         """Counts (n,) at rig times ``t`` (n,) s."""
         angle = self.angles(t)
-        counts = np.floor(angle / self._quantum + 0.5).astype(np.int64)
+        counts = np.floor((angle - self._zero) / self._quantum + 0.5).astype(np.int64)
         return counts - (self._places(counts) > angle)
 
     def times_of(self, counts: npt.NDArray[np.int64]) -> Array:
@@ -86,7 +89,7 @@ class Disc:
         return self._motion.times_of_angles(self._places(counts))
 
     def _places(self, counts: npt.NDArray[np.int64]) -> Array:
-        return np.asarray(counts * self._quantum + self.errors[counts % len(self.errors)])
+        return np.asarray(counts * self._quantum + self.errors[counts % len(self.errors)] + self._zero)
 
     def _time_of(self, angle: float) -> float:
         """When the head was at ``angle`` first: inside a jump at its time, else when the string got so far."""
@@ -102,4 +105,4 @@ class Disc:
 
     def _place(self, count: int) -> float:
         """Angle (rad) at which the edge that makes ``count`` passes."""
-        return count * self._quantum + float(self.errors[count % len(self.errors)])
+        return count * self._quantum + float(self.errors[count % len(self.errors)]) + self._zero

@@ -16,6 +16,7 @@ from node.kernels.arithmetic.formats import PERIOD
 from sim.world.disc import Disc
 from sim.world.marks import Marks
 from sim.world.motion import Motion, SchedulePhase, Trapezoid
+from sim.world.moved_hole import MovedHole, move_hole
 from sim.world.rack import Rack
 from sim.world.random_streams import RandomStream, random_stream
 from sim.world.rough_run import RoughRun
@@ -54,7 +55,9 @@ class DrillString:
         free_at = (self.marks.made_up - FREE_BEFORE).tolist() if turns_free else []
         free_by = self.marks.free_turns.tolist() if turns_free else []
         edge_std, lines = math.radians(file.encoder.edge_std_deg), random_stream(seed, RandomStream.DISC, 0)
-        self.disc = Disc(self.motion, file.encoder.counts_per_turn, edge_std, lines, free_at, free_by)
+        self.disc = Disc(
+            self.motion, file.encoder.counts_per_turn, edge_std, lines, free_at, free_by, zero=file.told.north
+        )
 
     @property
     def cycles(self) -> int:
@@ -76,15 +79,24 @@ class DrillString:
 
     def truth(self, tube: int) -> TubeTruth:
         """Perfect sensor of a tube."""
-        a = self.scenario.file.accelerometer
-        below = (tube - 1) * self.scenario.tube_length
+        a, below = self.scenario.file.accelerometer, self.below(tube)
         joint = self.marks.frame_angle(tube)
         twist = None if self.torsion is None else partial(self.torsion.twist, tube)
         slips = partial(self.marks.unseen, tube) if self.scenario.file.joints.unseen_std_deg else None
         hole, motion = self.scenario.hole, self.motion
         if self.scenario.file.rough is None:
-            return TubeTruth(hole, motion, below, joint, a.radius_m, a.gravity_mps2, twist, slips)
-        return self._rough_truth(tube, joint, a.radius_m, a.gravity_mps2, slips)
+            return TubeTruth(hole, motion, below, joint, a.radius_m, a.gravity_mps2, twist, slips, self.moved_hole)
+        return self._rough_truth(tube, joint, a.radius_m, a.gravity_mps2, slips, self.moved_hole)
+
+    def below(self, tube: int) -> float:
+        """Length (m) of the string below the node of a tube."""
+        return self.scenario.file.told.below(tube, self.scenario.tube_length)
+
+    @cached_property
+    def moved_hole(self) -> MovedHole | None:
+        """What becomes of the hole while the rig drills."""
+        section = self.scenario.file.path.moved
+        return None if section is None else move_hole(self.scenario.hole, section, self.begin)
 
     def yaw_truth(self, tube: int, t: float) -> float:
         """True yaw (rad, unwrapped) of the IMU's frame of a tube that is part of the string."""
@@ -104,12 +116,14 @@ class DrillString:
         else:
             made_up = max(self.scenario.file.rig.tubes_at_start, tube)
             rigid = self.marks.errors(tube)[made_up - tube] - self.marks.unseen(tube, t)
+        rigid = rigid - self.scenario.file.told.north
         return np.asarray(rigid if self.torsion is None else rigid + self.torsion.twist(tube, t)[0])
 
     def truth_station(self, md: float) -> dict[str, float]:
-        """Direction and position of the hole at one depth, degrees and metres."""
-        inclination, azimuth = self.scenario.hole.direction(md)
-        north, east, tvd = self.scenario.hole.position(md)
+        """Direction and position of the hole at one depth, degrees and metres; as a hole that moves is at the end."""
+        hole = self.scenario.hole if self.moved_hole is None else self.moved_hole.hole
+        inclination, azimuth = hole.direction(md)
+        north, east, tvd = hole.position(md)
         return {
             "md_m": md,
             "inclination_deg": math.degrees(inclination),
@@ -127,8 +141,8 @@ class DrillString:
     def _rough_truth(self, tube: int, *given: Any) -> RoughTruth:
         if tube not in self._rough_truths:
             twist = None if self.torsion is None else partial(self.torsion.twist, tube)
-            below = (tube - 1) * self.scenario.tube_length
-            self._rough_truths[tube] = self.rough_run.truth(tube, self.scenario.hole, below, twist, *given)
+            hole, below = self.scenario.hole, self.below(tube)
+            self._rough_truths[tube] = self.rough_run.truth(tube, hole, below, twist, *given)
         return self._rough_truths[tube]
 
     def _motion(self, drilling: float) -> Motion:

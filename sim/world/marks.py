@@ -33,7 +33,8 @@ class Marks:
 
     def __init__(self, scenario: Scenario, seed: int, motion: Motion) -> None:
         self._tubes, self._rig = scenario.tubes, scenario.file.rig
-        self._section, self._rough, self._told = scenario.file.joints, scenario.file.rough, scenario.file.setup
+        self._section, self._rough = scenario.file.joints, scenario.file.rough
+        self._told, self._wrong = scenario.file.setup, scenario.file.told
         self._seed = seed
         self.made_up = motion.make_ups if self._rig.tubes_at_start else motion.make_ups[1:]
 
@@ -44,10 +45,11 @@ class Marks:
         std = math.radians(self._section.reading_std_deg)
         drive, lower = self._joint_angles
         drive_error, lower_error = self._joint_errors
-        misread = self._misread(tube)
+        drive_misread, lower_misread = self._wrong.misread(tube)
+        misread = self._misread(tube) + drive_misread
         return PassedTube(
             MakeUpAngle(wrap_angle(drive[tube] - self._turned_before(tube) + drive_error[tube] + misread), std),
-            MakeUpAngle(wrap_angle(lower[tube] + lower_error[tube]), std),
+            MakeUpAngle(wrap_angle(lower[tube] + lower_error[tube] + lower_misread), std),
         )
 
     def errors(self, tube: int) -> Array:

@@ -35,6 +35,11 @@ class RandomStream(IntEnum):
     RADIO_BURSTS = 24
     GAUNTLET = 25  # 0: which kinds of faults, 1: when and what, 2: ports, 3: strangers, 4: disks, 5: disks before
     LOTS = 26  # of starts that are numbered by lot
+    DRAWN_HOLES = 27  # shape of a hole that is drawn
+    PLAY = 28  # how a tube lies in the hole: 0: at every stop, 1: its own bow
+    EXCHANGED = 29  # what a calibration takes away, of tubes that have each other's
+    DEPTH_ERRORS = 30  # of the measured depth, at every stop
+    SET_UP = 31  # what a crew tells, of rigs that are drawn
     ROUGH_STOPS = 40  # how far a string runs on into its play
     ROUGH_ENCODER = 41  # where a disc is off its centre
     ROUGH_OUTLIERS = 42  # of the encoder, by the time of the reading

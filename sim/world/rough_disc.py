@@ -29,17 +29,26 @@ class RoughDisc:
     begin : s, of the run
     errors : (counts,) rad, of each line's place
     seed : of the run
+    zero : rad, angle of the head at which its count is 0
     """
 
     def __init__(
-        self, section: RoughEncoderSection, t: Array, head: Array, begin: float, errors: Array, seed: int
+        self,
+        section: RoughEncoderSection,
+        t: Array,
+        head: Array,
+        begin: float,
+        errors: Array,
+        seed: int,
+        *,
+        zero: float = 0.0,
     ) -> None:
         self._section, self._begin, self._t = section, begin, t
         self._errors, self._quantum = errors, math.tau / len(errors)
         random = random_stream(seed, RandomStream.ROUGH_ENCODER)
         self._phase, self._outliers = float(random.uniform(0.0, math.tau)), seed
         self._head = head
-        self.shown = self._shown(head)
+        self.shown = self._shown(head) - zero
         self._counts = self._counts_at(self.shown)
         self._first = int(self._counts[0])
         self._edges, self._after, self._rising = self._find_edges()

@@ -12,6 +12,7 @@ from sim.world.borehole import Borehole
 from sim.world.disturbance.row import OneImu, TubeMotion
 from sim.world.disturbance.sensor_reading import move_tube
 from sim.world.motion import Motion
+from sim.world.moved_hole import MovedHole
 from sim.world.rough_disc import RoughDisc
 from sim.world.rough_motion import RoughMotion
 from sim.world.rough_section import RoughSection
@@ -43,7 +44,8 @@ class RoughRun:
     def disc(self) -> RoughDisc:
         """The encoder."""
         section, moved = self._section.encoder, self.moved
-        return RoughDisc(section, moved.t, moved.head, self._begin, self._line_errors, self._seed)
+        zero = self._file.told.north
+        return RoughDisc(section, moved.t, moved.head, self._begin, self._line_errors, self._seed, zero=zero)
 
     def truth(
         self,
@@ -55,6 +57,7 @@ class RoughRun:
         radius: float,
         gravity: float,
         unseen: Callable[[Array], Array] | None,
+        hole_later: MovedHole | None,
     ) -> RoughTruth:
         """Perfect sensor of a tube; what it is given is as ``TubeTruth`` takes it."""
         section, moved = self._section, self.moved
@@ -65,4 +68,5 @@ class RoughRun:
         if section.string.transport == "parallel":
             reached = np.maximum(self._schedule.depth(moved.t)[0] - below, 0.0)
             angle = angle + transport_angle(hole, reached)
-        return RoughTruth(moved.t, angle, hole, self._schedule, below, joint_angle, radius, gravity, None, unseen)
+        given = hole, self._schedule, below, joint_angle, radius, gravity, None, unseen, hole_later
+        return RoughTruth(moved.t, angle, *given)

@@ -9,9 +9,11 @@ from typing import Any
 from sim.errors import ScenarioError
 from sim.node_kills import KillNode, parse_fault
 from sim.world.borehole import Borehole, read_displacements, read_stations
+from sim.world.drawn_hole import draw_hole
 from sim.world.parsing import read_toml, validate_tables
+from sim.world.path_section import PathSection
 from sim.world.scenario_checks import check_scenario
-from sim.world.scenario_file import VERSION, PathSection, ScenarioFile
+from sim.world.scenario_file import VERSION, ScenarioFile
 from sim.world.shipped import find_scenario
 
 
@@ -89,10 +91,11 @@ def _checked(path: Path, file: ScenarioFile, faults: tuple[str, ...]) -> Scenari
 
 def _hole(path: Path, section: PathSection, length: float) -> Borehole:
     files = [name for name in (section.displacements, section.stations) if name is not None]
-    given = len(files) + (section.straight is not None) + (section.spiral is not None)
+    made = [one for one in (section.straight, section.spiral, section.drawn) if one is not None]
+    given = len(files) + len(made)
     if given != 1:
         raise ScenarioError(
-            f"{path}: path: expected exactly one of displacements, stations, straight and spiral, got {given}"
+            f"{path}: path: expected exactly one of displacements, stations, straight, spiral and drawn, got {given}"
         )
     if section.spiral is not None:
         spiral = section.spiral
@@ -103,6 +106,8 @@ def _hole(path: Path, section: PathSection, length: float) -> Borehole:
         straight = section.straight
         end = max(length, 1.0)
         return Borehole.straight(math.radians(straight.inclination_deg), math.radians(straight.azimuth_deg), end)
+    if section.drawn is not None:
+        return draw_hole(section.drawn, max(length, 1.0))
     source = path.parent / files[0]
     reader = read_displacements if section.displacements is not None else read_stations
     return Borehole(*reader(source), where=str(source))

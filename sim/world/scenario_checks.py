@@ -36,6 +36,8 @@ def check_scenario(path: Path, file: ScenarioFile) -> None:
     _check_node(path, file)
     _check_calibration(path, file.calibration)
     _check_disturbances(path, file)
+    _check_told(path, file)
+    _check_moved(path, file)
 
 
 def _check_motion(path: Path, file: ScenarioFile) -> None:
@@ -183,4 +185,45 @@ def _check_disturbances(path: Path, file: ScenarioFile) -> None:
         if section is None:
             known = ", ".join(sections) or "none"
             raise ScenarioError(f"{path}: disturbance.{name}: no such disturbance has a table; expected one of {known}")
-        validate_tables(Path(f"{path}: disturbance.{name}"), table, section, 1)
+        made = validate_tables(Path(f"{path}: disturbance.{name}"), table, section, 1)
+        _check_tube(path, file, f"disturbance.{name}.tube", getattr(made, "tube", 1))
+        _check_pair(path, file, f"disturbance.{name}.tubes", getattr(made, "tubes", None))
+
+
+def _check_tube(path: Path, file: ScenarioFile, key: str, tube: int) -> None:
+    if not 1 <= tube <= file.rig.tubes:
+        raise ScenarioError(f"{path}: {key}: expected one of {file.rig.tubes} tubes, got {tube}")
+
+
+def _check_pair(path: Path, file: ScenarioFile, key: str, tubes: tuple[int, int] | None) -> None:
+    if tubes is None:
+        return
+    if tubes[0] == tubes[1]:
+        raise ScenarioError(f"{path}: {key}: expected two tubes, got {tubes[0]} twice")
+    for tube in tubes:
+        _check_tube(path, file, key, tube)
+
+
+def _check_told(path: Path, file: ScenarioFile) -> None:
+    told = file.told
+    _check_tube(path, file, "told.joint_tube", told.joint_tube)
+    if len(told.lengths_off_m) > file.rig.tubes:
+        raise ScenarioError(
+            f"{path}: told.lengths_off_m: expected at most {file.rig.tubes}, one a tube, got {len(told.lengths_off_m)}"
+        )
+    if told.depth_stuck_s is not None and told.depth_stuck_after_s is None:
+        raise ScenarioError(f"{path}: told.depth_stuck_s: expected depth_stuck_after_s with it")
+
+
+def _check_moved(path: Path, file: ScenarioFile) -> None:
+    moved = file.path.moved
+    if moved is None:
+        return
+    if moved.to_m <= moved.from_m:
+        raise ScenarioError(
+            f"{path}: path.moved.to_m: expected more than from_m = {moved.from_m:g}, got {moved.to_m:g}"
+        )
+    if moved.to_m > file.depth:
+        raise ScenarioError(
+            f"{path}: path.moved.to_m: expected at most the {file.depth:g} m that are drilled, got {moved.to_m:g}"
+        )

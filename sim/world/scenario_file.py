@@ -12,10 +12,12 @@ from pydantic_core import PydanticCustomError
 
 from node.firmware.kernel_choice import LOOPS
 from node.kernels.record.sensor_record import MAX_IMUS
+from sim.world.path_section import PathSection
 from sim.world.radio_section import RadioSection
 from sim.world.rough_section import RoughSection
 from sim.world.section import Angle, NotNegative, Positive, Probability, ScenarioSection, Triple
 from sim.world.site_section import SiteSection
+from sim.world.told_section import ToldSection
 from telemetry.messages import MAX_TUBE
 
 VERSION = 1  # of the format
@@ -41,31 +43,6 @@ class RigSection(ScenarioSection):
     def depth_at_start(self) -> float:
         """Depth (m) of the bit at the start."""
         return self.hanging if self.depth_at_start_m is None else self.depth_at_start_m
-
-
-class StraightSection(ScenarioSection):
-    """A straight hole."""
-
-    inclination_deg: float = Field(0.0, ge=0.0, lt=180.0)
-    azimuth_deg: Angle = 0.0
-
-
-class SpiralSection(ScenarioSection):
-    """A hole whose azimuth turns evenly over its length, and its inclination with it."""
-
-    inclination_deg: float = Field(0.0, ge=0.0, le=90.0)
-    azimuth_deg: Angle = 0.0
-    turn_deg: Angle = Field(0.0, description="of the azimuth, from the collar to the last bit's depth")
-    build_deg: float = Field(0.0, ge=-90.0, le=90.0, description="of the inclination, likewise")
-
-
-class PathSection(ScenarioSection):
-    """The hole; exactly one of the four, files relative to the scenario."""
-
-    displacements: str | None = Field(None, description="CSV md_m,a_cm,b_cm: lateral displacement over one interval")
-    stations: str | None = Field(None, description="CSV md_m,inclination_deg,azimuth_deg")
-    straight: StraightSection | None = Field(None, description="a hole in one direction, as long as it takes")
-    spiral: SpiralSection | None = Field(None, description="a hole whose azimuth turns, as long as it takes")
 
 
 class ScheduleSection(ScenarioSection):
@@ -327,6 +304,7 @@ class ScenarioFile(ScenarioSection):
     node: NodeSection = NodeSection()
     design: DesignSection = DesignSection()
     drift: DriftSection | None = None
+    told: ToldSection = Field(ToldSection(), description="what the crew tells wrongly")
     calibration: CalibrationSection | None = None
     site: SiteSection | None = Field(
         None, description="a wall whose holes are drilled one after the other, each straight in place of the path"

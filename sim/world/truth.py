@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from sim.world.borehole import Borehole
 from sim.world.motion import Motion
+from sim.world.moved_hole import MovedHole
 
 Array = npt.NDArray[np.float64]
 Along = tuple[Array, Array, Array]  # tangent, its time derivative, acceleration
@@ -51,6 +52,7 @@ class TubeTruth:
     gravity : m/s^2
     twist : rad by which the tube lags the drive head at rig times (n,), with two derivatives; a rigid string has none
     unseen : rad by which the tube has slipped at rig times (n,), in jumps that no gyroscope sees
+    moved : what becomes of the hole at a rig time, in a jump that no gyroscope sees
     """
 
     def __init__(
@@ -63,8 +65,9 @@ class TubeTruth:
         gravity: float,
         twist: Twist | None = None,
         unseen: Callable[[Array], Array] | None = None,
+        moved: MovedHole | None = None,
     ) -> None:
-        self._hole = hole
+        self._hole, self._moved = hole, moved
         self._motion = motion
         self._below = below
         self._joint_angle = joint_angle
@@ -145,7 +148,11 @@ class TubeTruth:
         """Tangent, its time derivative and the acceleration of the tube, each (n, 3)."""
         bit, speed, thrust = self._motion.depth(t)
         inside = bit > self._below  # before, the tube waits upright at the collar
-        tangent, curvature = self._hole.tangent(np.where(inside, bit - self._below, 0.0))
+        md = np.where(inside, bit - self._below, 0.0)
+        tangent, curvature = self._hole.tangent(md)
+        if self._moved is not None:
+            later = t > self._moved.at
+            tangent[later], curvature[later] = self._moved.hole.tangent(md[later])
         speed, thrust = speed * inside, thrust * inside
         acceleration = thrust[:, None] * tangent + speed[:, None] ** 2 * curvature
         return tangent, speed[:, None] * curvature, acceleration

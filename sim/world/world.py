@@ -16,6 +16,7 @@ from node.firmware.tube_settings import TubeSettings
 from node.kernels.record.filter_record import Scheme
 from sim.errors import ScenarioError
 from sim.node_kills import KillNode
+from sim.world.depth_meter import DepthMeter
 from sim.world.drill_string import DrillString
 from sim.world.radio import RadioLinks
 from sim.world.random_streams import RandomStream, random_stream
@@ -45,6 +46,7 @@ class World(DrillString):
         self.faults: tuple[KillNode, ...] = scenario.faults
         self._check_faults()
         self.radio = self._radio_links()
+        self.depth_meter = DepthMeter(scenario, seed, self.motion, self.begin)
 
     def aided_like(self, scenario: Scenario) -> World:
         """The same world under the aiding of another scenario: what was worked out of it holds for either."""
@@ -77,8 +79,12 @@ class World(DrillString):
         return count, edge_at, rising, torque, earlier
 
     def bit_depth(self, t: float) -> float:
-        """Measured depth of the bit, m."""
+        """Depth of the bit along the hole, m."""
         return float(self.motion.depth(np.array([t]))[0][0])
+
+    def measured_depth(self, t: float) -> float:
+        """Depth of the bit as the rig measures it, m."""
+        return self.depth_meter.measure_depth(t)
 
     def local_clock(self, address: int, t: float) -> float:
         """What the clock of a process shows at rig time ``t`` (s)."""

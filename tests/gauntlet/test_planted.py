@@ -11,6 +11,7 @@ import pytest
 from borechain.gauntlet import gauntlet_rig
 from borechain.gauntlet.gauntlet_run import run_seed, shrink_outcome
 from groundstation.errors import StoreError
+from groundstation.service.answers import adjustment_views
 from groundstation.service.disk import database
 from groundstation.service.disk.keeper import StringKeeper
 from groundstation.service.hole import placement as placement_module
@@ -264,7 +265,13 @@ def a_link_without_a_neighbour_is_bounded(folder: Path) -> str:
     return "" if link.waiting <= 600 else f"{link.waiting} wait"
 
 
+def more_is_said_to_be_found(patch: pytest.MonkeyPatch) -> None:
+    """The smallest blunder that is found is stated a hundred times too small."""
+    patch.setattr(adjustment_views, "MILLI_G", 100.0 * adjustment_views.MILLI_G)
+
+
 PLANTED: dict[str, tuple[Plant, Found]] = {
+    "more is said to be found": (more_is_said_to_be_found, seeds("force-step", count=6)),
     "no depth bracket": (no_depth_bracket, seeds("depth-lost", count=20)),
     "flags ignored": (flags_ignored, seeds("gyro-stuck")),
     "receipt sent before the store has it": (receipt_before_the_store, seeds("ground-disk-refuses")),

@@ -63,6 +63,10 @@ def gyroscope(**values: Any) -> Tables:
     return change_sections(PLAIN, gyroscope=values)
 
 
+def disturbed(name: str, **values: Any) -> Tables:
+    return change_sections(PLAIN, disturbance={name: values})
+
+
 # each row of the table on, above a string on which it is off; what is drawn cycle by cycle is alike by distribution
 EXACT: dict[str, Tables] = {
     "pull-across": sensor(g_sensitivity_dps_per_g=1.0),
@@ -76,6 +80,14 @@ EXACT: dict[str, Tables] = {
     "steps": gyroscope(resolution_dps=0.7),
     "range": gyroscope(range_dps=50.0),
     "force-bias": change_sections(PLAIN, accelerometer={"bias_std_deg": 1.0}),
+    "mount-tilt": change_sections(PLAIN, joints={"mount_tilt_std_deg": 1.0}),
+    "play": disturbed("play", sigma_deg=0.5, bow_deg=0.5),
+    "mount-slip": disturbed("mount-slip", after_s=70.0, pitch_deg=2.0, roll_deg=-3.0, turn_deg=10.0),
+    "force-step": disturbed("force-step", after_s=80.0, step_mg=(1.0, -2.0, 3.0), creep_mg_per_s=(0.1, 0.2, -0.3)),
+    "calibration-exchanged": change_sections(
+        disturbed("calibration-exchanged", raw_mg=20.0), rig={"tubes": 2, "tubes_at_start": 2}
+    ),
+    "axes-exchanged": disturbed("axes-exchanged", after_s=80.0),
 }
 DRAWN_ANEW: dict[str, tuple[Tables, ...]] = {
     "torsional-vibration": (rough_with(vibration={"torsional_dps": 5.0}),),
@@ -95,7 +107,6 @@ DRAWN_ANEW: dict[str, tuple[Tables, ...]] = {
 }
 REFUSED: dict[str, Tables] = {
     "earth-rate": change_sections(ROUGH, rough={"latitude_deg": 50.0}),
-    "mount-tilt": change_sections(PLAIN, joints={"mount_tilt_std_deg": 1.0}),
     "rectification": rough_with(vibration={"turning_g": 0.5}, sensor={"rectification_dps_per_g2": 1.0}),
     "asymmetry": sensor(scale_asymmetry=0.01),
     "clipped-rates": change_sections(ROUGH, gyroscope={"range_dps": 60.0}),
@@ -265,12 +276,18 @@ IN_FIELD: Tables = change_sections(
 )
 FOLDER = Path(__file__).parents[2] / "scenarios"
 SPIRAL = {"inclination_deg": 20.0, "azimuth_deg": 35.0, "turn_deg": 10.0}
+MOVED = {"after_s": 10.0, "from_m": 1.0, "to_m": 2.0, "north_deg": 1.0}
 ATTITUDES = [[0, 0], [0, 45], [0, 90], [0, 135], [0, 180], [0, -135], [45, 0], [90, 0], [-90, 0], [-45, 0]]
 SOIL = [{"sand": 0.5, "clay": 0.1, "water": 0.1}]
 HOLES = [{"name": "a"}, {"name": "b", "north_m": 1.0}]
 # what a key needs beside it to mean anything, by the key or the table that it is in
 BESIDE: dict[str, dict[str, Any]] = {
     "path.spiral.": {"path": {"straight": None, "spiral": SPIRAL}},
+    "path.drawn.": {"path": {"straight": None, "drawn": {}}},
+    "path.moved.": {"path": {"moved": MOVED}},
+    "told.joint_tube": {"told": {"joint_deg": 5.0}},
+    "told.joint_deg": {"told": {"joint_tube": 2}},
+    "told.depth_stuck_s": {"told": {"depth_stuck_after_s": 10.0}},
     "torsion": {"schedule": {"stop_s": 40.0}},
     "aiding.on_s": {"aiding": {"off_s": 10.0}},
     "medium.delay_ms": {"medium": {"dated_by": "arrival"}},
@@ -288,6 +305,16 @@ OTHER: dict[str, Any] = {
     "rig.tubes_at_start": 0,
     "rig.depth_at_start_m": 1.0,
     "path.straight": {"inclination_deg": 10.0},
+    "path.drawn.seed": 2,
+    "path.moved": MOVED,
+    "path.moved.after_s": 20.0,
+    "path.moved.from_m": 0.5,
+    "path.moved.to_m": 3.0,
+    "setup.untold": ["joints"],
+    "told.joint_tube": 2,
+    "told.lengths_off_m": [0.5],
+    "told.depth_stuck_after_s": 10.0,
+    "told.depth_stuck_s": 20.0,
     "schedule.blocks": 3,
     "rotation.advance_m": 1.0,
     "joints.head_turn_deg": 10.0,
@@ -326,10 +353,11 @@ INSTEAD: dict[str, dict[str, Any]] = {
     "path.displacements": {"path": {"straight": None, "displacements": str(FOLDER / "wellbore-1-path.csv")}},
     "path.stations": {"path": {"straight": None, "stations": str(FOLDER / "field-calibration-path.csv")}},
     "path.spiral": {"path": {"straight": None, "spiral": SPIRAL}},
+    "path.drawn": {"path": {"straight": None, "drawn": {"inclination_deg": 20.0}}},
     "radio.mode": {"medium": {"link": "on"}, "radio": {"mode": "pipe", "pipe": {}, "frequency_mhz": 5800.0}},
     "rough": {"rough": IN_FIELD["rough"], "encoder": IN_FIELD["encoder"]},
 }
-# the format has one version, and what ``disturbance`` holds is of rows that the table of the program has none of
+# the format has one version, and tables below ``disturbance`` are tried row by row
 ELSEWHERE = ("version", "disturbance")
 
 

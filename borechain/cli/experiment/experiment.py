@@ -27,10 +27,10 @@ out_option = click.option(
 
 @plain_faults
 def load_studies() -> dict[str, Study]:
-    """The table, loaded when a command asks for it."""
-    from sim.studies.study_table import STUDIES
+    """The tables, loaded when a command asks for them."""
+    from borechain.studies.rig_study_table import all_studies
 
-    return STUDIES
+    return all_studies()
 
 
 class Studies(click.Group):

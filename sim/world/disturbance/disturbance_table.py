@@ -10,17 +10,22 @@ from typing import Final
 
 from sim.world.disturbance.accelerometer import FORCE_BIAS, FORCE_NOISE
 from sim.world.disturbance.asymmetry import ASYMMETRY
+from sim.world.disturbance.axes_exchanged import AXES_EXCHANGED
 from sim.world.disturbance.bias_step import BIAS_STEP
+from sim.world.disturbance.calibration_exchanged import CALIBRATION_EXCHANGED
 from sim.world.disturbance.converter import CLIPPED_FORCES, CLIPPED_RATES, RANGE, STEPS
 from sim.world.disturbance.drift import DRIFT
 from sim.world.disturbance.earth_rate import EARTH_RATE
 from sim.world.disturbance.eighths import EIGHTHS
 from sim.world.disturbance.fifo import FRAMES, JITTER
 from sim.world.disturbance.force_pull import PULL_ACROSS, PULL_ALONG
+from sim.world.disturbance.force_step import FORCE_STEP
 from sim.world.disturbance.gyroscope import GYROSCOPE
 from sim.world.disturbance.low_pass import LOW_PASS
+from sim.world.disturbance.mount_slip import MOUNT_SLIP
 from sim.world.disturbance.mount_tilt import MOUNT_TILT
 from sim.world.disturbance.row import Disturbance
+from sim.world.disturbance.tube_play import PLAY
 from sim.world.disturbance.vibration import RECTIFICATION, TORSIONAL, VIBRATION
 from sim.world.disturbance.wander import WANDER
 from sim.world.disturbance.warm_up import WARM_UP
@@ -29,6 +34,8 @@ from sim.world.disturbance.white_noise import SINGLE_SAMPLES, WHITE_NOISE
 TABLE: Final[tuple[Disturbance, ...]] = (
     TORSIONAL,
     EARTH_RATE,
+    PLAY,
+    MOUNT_SLIP,
     MOUNT_TILT,
     VIBRATION,
     RECTIFICATION,
@@ -51,5 +58,8 @@ TABLE: Final[tuple[Disturbance, ...]] = (
     RANGE,
     EIGHTHS,
     FORCE_BIAS,
+    FORCE_STEP,
+    CALIBRATION_EXCHANGED,
     FORCE_NOISE,
+    AXES_EXCHANGED,
 )

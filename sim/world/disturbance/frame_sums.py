@@ -181,5 +181,5 @@ class StillString:
 
     def _truth(self, place: int) -> TubeTruth:
         scenario = self._world.scenario
-        gravity, below = scenario.file.accelerometer.gravity_mps2, place * scenario.tube_length
-        return self._run.truth(place + 1, scenario.hole, below, None, 0.0, 0.0, gravity, None)
+        gravity, below = scenario.file.accelerometer.gravity_mps2, self._world.below(place + 1)
+        return self._run.truth(place + 1, scenario.hole, below, None, 0.0, 0.0, gravity, None, None)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 
-from sim.world.disturbance.row import ActsOn, Disturbance, ImuSamples, OneImu
+import numpy as np
+
+from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
 from sim.world.random_streams import RandomStream
+from sim.world.scenario_file import ScenarioFile
 from sim.world.truth import imu_frame
 
 Tilt = tuple[float, float]  # pitch and roll, rad
@@ -24,4 +27,18 @@ def lean_samples(samples: ImuSamples, _: OneImu, tilt: Tilt) -> None:
     samples.rate, samples.force = samples.rate @ frame.T, samples.force @ frame.T
 
 
-MOUNT_TILT = Disturbance("mount-tilt", ("joints.mount_tilt_std_deg",), ActsOn.FELT, lean_samples, draw_tilt)
+def tilt_gains(tilt: Tilt, _: ScenarioFile) -> Array:
+    """What the sensor shows, (6, 6)."""
+    shown = np.zeros((6, 6))
+    shown[:3, :3] = shown[3:, 3:] = imu_frame(*tilt)
+    return shown
+
+
+MOUNT_TILT = Disturbance(
+    "mount-tilt",
+    ("joints.mount_tilt_std_deg",),
+    ActsOn.FELT,
+    lean_samples,
+    draw_tilt,
+    Compiled(gains=tilt_gains),
+)

@@ -1,0 +1,83 @@
+"""A hole as the ground station knows it beside the truth: errors and what is stated of them, station by station.
+
+A station is where its readings were on the mean: what it says of a depth that was measured wrongly is judged at the
+true one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.service.hole.station import SurveyStation
+from groundstation.service.hole.surveyed_hole import SurveyedHole
+from sim.world.world import World
+
+Array = npt.NDArray[np.float64]
+INSIDE_1, INSIDE_2, INSIDE_3 = 3.841, 5.991, 7.815  # 95 % points of chi-square with 1, 2 and 3 degrees of freedom
+AXES: Final = ("north", "east", "vertical")
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedHole:
+    """Stations from the collar down, of one rig.
+
+    Attributes
+    ----------
+    md : (s,) m, as it is told
+    lean_error, lean_cov : (s, 2) and (s, 2, 2) rad, of the horizontal part of the unit vector
+    error, cov : (s, 3) and (s, 3, 3) m, of the position: north, east, down
+    """
+
+    md: Array
+    lean_error: Array
+    lean_cov: Array
+    error: Array
+    cov: Array
+
+    @property
+    def direction_squares(self) -> Array:
+        """Squares (s,) of the direction's error in its own standard deviations, of two degrees of freedom."""
+        return quadratic_forms(self.lean_error, self.lean_cov)
+
+    @property
+    def ellipsoid_squares(self) -> Array:
+        """Likewise (s,) of the position's, of three."""
+        return quadratic_forms(self.error, self.cov)
+
+    @property
+    def axis_squares(self) -> Array:
+        """Likewise (s, 3) of each axis of the position by itself."""
+        return np.asarray(self.error**2 / np.diagonal(self.cov, axis1=1, axis2=2))
+
+
+def judge_hole_of(world: World, hole: SurveyedHole) -> JudgedHole:
+    """A hole at the end of a run beside the truth of its world; without a station where nothing could be placed."""
+    true_hole = world.scenario.hole if world.moved_hole is None else world.moved_hole.hole
+    stations = [station for station in hole.stations if station.md > 0.0]
+    depths = np.array([true_depth(world, station) for station in stations], np.float64)
+    directions = [hole.direction_of(station) for station in stations]
+    places = [hole.place_of(station) for station in stations]
+    lean = np.reshape([one.lean for one in directions], (-1, 2)) - true_hole.tangent(depths)[0][:, :2]
+    true_positions = np.reshape([true_hole.position(float(md)) for md in depths], (-1, 3))
+    return JudgedHole(
+        np.array([station.md for station in stations]),
+        lean,
+        np.reshape([one.total_cov for one in directions], (-1, 2, 2)),
+        hole.trajectory.positions[places] - true_positions,
+        hole.trajectory.covs[places],
+    )
+
+
+def true_depth(world: World, station: SurveyStation) -> float:
+    """True depth (m) along the hole at which the readings of a station were made, on the mean."""
+    tubes, times = station.stops.column("tube").tolist(), station.stops.column("at").tolist()
+    return float(np.mean([world.bit_depth(at) - world.below(tube) for tube, at in zip(tubes, times, strict=True)]))
+
+
+def quadratic_forms(error: Array, cov: Array) -> Array:
+    """``error^T cov^-1 error`` (s,) of errors (s, n)."""
+    return np.asarray(np.einsum("sa,sa->s", error, np.linalg.solve(cov, error[:, :, None])[:, :, 0]))

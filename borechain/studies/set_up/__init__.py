@@ -1,0 +1,1 @@
+"""Whether what is said of a hole holds, over rigs whose set-up errs as it is stated."""

@@ -1,0 +1,49 @@
+"""Kinds of blunders: each is a scenario of its own in all sizes, and outcomes are told apart."""
+
+import pytest
+
+from borechain.studies.blunders.answer_given import AnswerGiven
+from borechain.studies.blunders.kinds import KINDS, PlantedBlunder
+from borechain.studies.blunders.run import BlunderJob, BlunderRun, outcome_of, tables_with
+from borechain.studies.drawn_rigs import KnownSetUp, drawn_rigs, tables_of
+from sim.world.path_section import HOLE_KINDS
+from sim.world.scenario import scenario_of
+
+HONEST = AnswerGiven("on_target", (), (), ())
+
+
+def test_there_are_enough_kinds_in_three_sizes() -> None:
+    assert len(KINDS) >= 25
+    assert len({kind.name for kind in KINDS}) == len(KINDS)
+    assert all(kind.sizes == tuple(sorted(kind.sizes)) for kind in KINDS)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_a_kind_changes_the_scenario_of_a_rig(kind: PlantedBlunder) -> None:
+    draw = drawn_rigs(KnownSetUp(), 1)[0]
+    honest = scenario_of(dict(tables_of(draw))).file
+    for size in range(3):
+        file = scenario_of(dict(tables_with(BlunderJob(draw, KINDS.index(kind), size)))).file
+        assert file != honest
+
+
+def test_rigs_are_drawn_by_their_number_and_have_every_kind_of_hole() -> None:
+    rigs = drawn_rigs(KnownSetUp(), 14)
+    assert {rig.kind for rig in rigs} == set(HOLE_KINDS)
+    assert tables_of(rigs[0]) == tables_of(drawn_rigs(KnownSetUp(), 2)[0])
+    assert tables_of(rigs[0])["told"] != tables_of(rigs[1])["told"]
+
+
+@pytest.mark.parametrize(
+    ("worst", "answer", "outcome"),
+    [
+        (9.0, AnswerGiven("on_target", (), (), ("mount",)), "named"),
+        (9.0, AnswerGiven("dont_know", ("setup",), (), ()), "doubted"),
+        (9.0, AnswerGiven("on_target", (), ("joint",), ()), "doubted"),
+        (9.0, AnswerGiven("on_target", (), (), ("depth",)), "doubted"),
+        (2.0, HONEST, "below"),
+        (9.0, HONEST, "missed"),
+    ],
+)
+def test_an_outcome_is_what_the_crew_is_told(worst: float, answer: AnswerGiven, outcome: str) -> None:
+    assert outcome_of(BlunderRun(worst, 1.0, 1.0, answer), ("mount",)) == outcome
