@@ -4,15 +4,40 @@ from __future__ import annotations
 
 import numpy as np
 
-from groundstation.survey.adjustment.adjust import adjust_hole
-from groundstation.survey.adjustment.looks import Looks, PathPrior, StringPrior
+from groundstation.survey.adjustment.kernels.free_parts import free_parts
+from groundstation.survey.adjustment.kernels.observations import add_looks, linearise_looks
+from groundstation.survey.adjustment.kernels.path_elimination import (
+    eliminate_path,
+    path_covariances,
+    reduce_right,
+    substitute_path,
+)
 
 
 def warm_adjustment() -> None:
-    """Adjust one look of one tube at one station, and work out what follows."""
-    first, gravity = np.zeros(1, np.intp), 9.81
-    force, known = np.array([[0.0, 0.0, -gravity]]), np.full(1, 1e-6)
-    looks = Looks(first + 1, first, first, first, force, known, np.zeros(1), known)
-    string = StringPrior(known, known, np.zeros(2), 1e-6 * np.eye(2), gravity, 1e-3, 1e-4)
-    path = PathPrior(np.array([0.0, 2.0]), np.array([0.0, 0.0, 1.0]), np.diag([1e-4, 1e-4, 0.0]), 1e-3, 20.0)
-    adjust_hole(looks, string, path).cofactor(np.zeros((2, 2, 1)), np.zeros((string.width, 1)))
+    """Call every kernel for one look of one tube at one station.
+
+    Nothing here multiplies matrices by the library for them: its threads would be lost in a process that is forked.
+    """
+    first, one, width = np.zeros(1, np.intp), np.ones(1), 8
+    forces, tangents, bases = np.array([[0.0, 0.0, -9.8]]), np.array([[0.0, 0.0, 1.0]]), np.zeros((1, 2, 3))
+    bases[0, 0, 0] = bases[0, 1, 1] = 1.0
+    jacobians, weights, residuals = np.zeros((1, 3, 9)), np.zeros((1, 3, 3)), np.zeros((1, 3))
+    linearise_looks(
+        first, first, first, forces, one, np.zeros(1), one, tangents, bases, np.zeros((1, 6)), np.zeros(1), 9.8, 1e-6,
+        jacobians, weights, residuals, np.zeros(1),
+    )  # fmt: skip
+    extra, common = np.zeros((1, 3, 0)), np.zeros((width + 1, width + 1))
+    add_looks(
+        first, first, first, jacobians, weights, residuals, extra, 6, np.zeros((1, 2, 2)), np.zeros((1, 2, width + 1)),
+        common,
+    )  # fmt: skip
+    diagonal, tied, coupled = np.eye(4)[None].copy(), np.zeros((1, 4, 4)), np.zeros((1, 4, width + 1))
+    eliminate_path(diagonal, tied, coupled)
+    reduce_right(diagonal, tied, coupled)
+    substitute_path(diagonal, tied, coupled)
+    path_covariances(diagonal, tied, np.zeros((1, 4, 4)))
+    free_parts(
+        first, first, first, jacobians, weights, extra, 6, np.zeros((1, 2, 2)), np.zeros((1, 2, width)),
+        np.zeros((width, width)), np.zeros((1, 3, 3)),
+    )  # fmt: skip
