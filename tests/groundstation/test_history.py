@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from groundstation.errors import SelectorError
 from groundstation.service.answers.thinning import largest_triangles
 from groundstation.service.hole.history import KEPT, History
+from groundstation.service.hole.packed_end import packed_end
 from groundstation.survey.wall.column_deviation import Deviations
 
 STOPS = (0.3, 0.3, 0.3, 1.0, 1.9)  # deg
@@ -126,3 +127,14 @@ def test_moments_keep_their_depths_whatever_stations_come_later() -> None:
     assert [list(map(tuple, moment.where.tolist())) for moment in history.moments] == told
     same, more = history.moments[0].where, history.moments[1].where
     assert np.shares_memory(same, more)
+
+
+def test_an_end_that_is_kept_packed_is_the_end_as_it_was(tmp_path: Path) -> None:
+    end = drilled(tmp_path).ground.model.hole.projection
+    assert end is not None
+    kept = packed_end(end).unpacked()
+    assert kept.within == pytest.approx(end.within, abs=2e-3)
+    assert kept.half_width == pytest.approx(end.half_width, rel=2e-3)
+    assert (kept.ends.md, kept.ends.along, kept.limit) == (end.ends.md, end.ends.along, end.limit)
+    np.testing.assert_allclose(kept.ends.cov, end.ends.cov)
+    np.testing.assert_allclose(kept.measured, end.measured)

@@ -237,7 +237,14 @@ def test_operators_get_stations_while_the_rig_drills(tmp_path: Path, ask: Any) -
             < region["stations"][2]["plan_ellipse"]["major_m"]
             < 0.01
         )
-        assert set(region["stations"][2]["sources"]) == {"random", "joints", "mounts", "accelerometer_bias"}
+        assert set(region["stations"][2]["sources"]) == {
+            "random",
+            "joints",
+            "mounts",
+            "accelerometer_bias",
+            "depth",
+            "path",
+        }
         column = ask(rig, f"{GROUND}/column")
         assert column["design"]["tolerance"] == "en-12716"
         assert column["worst"]["deviation_cm"] > 0.0

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.service.hole.packed_end import PackedEnd, packed_end
 from groundstation.survey.wall.column_deviation import Deviation, Deviations
 from groundstation.survey.wall.projected_end import ProjectedEnd
 
@@ -35,7 +36,7 @@ class Moment:
     at: float  # s, rig time of the newest survey
     where: Array  # (n, 2) m: measured depth and limit of every station
     found: Few  # (n, 6) m and m^2: along, offset (2), covariance (north, both, east)
-    projection: ProjectedEnd | None
+    end: PackedEnd | None
 
     @property
     def rows(self) -> list[Deviation]:
@@ -51,9 +52,14 @@ class Moment:
         return float(self.where[-1, 0])
 
     @property
+    def projection(self) -> ProjectedEnd | None:
+        """The end as it was foreseen, without the way there; None before the first station."""
+        return None if self.end is None else self.end.unpacked()
+
+    @property
     def about(self) -> Deviation:
         """What matters: the end, or before that is known the worst station."""
-        return self.projection.ends if self.projection else max(self.rows, key=lambda row: row.ratio)
+        return self.end.ends if self.end else max(self.rows, key=lambda row: row.ratio)
 
 
 class History:
@@ -78,7 +84,8 @@ class History:
         where = self._kept_once(np.stack([rows.md, rows.limit], axis=1))
         covs = rows.cov.reshape(-1, 4)
         found = np.column_stack([rows.along, rows.offset, covs[:, UPPER]]).astype(np.float32)
-        self.moments.append(Moment(self.count, self._newest[1], where, found, projection))
+        end = None if projection is None else packed_end(projection)
+        self.moments.append(Moment(self.count, self._newest[1], where, found, end))
         if len(self.moments) > KEPT:
             half = KEPT // 2
             self.moments = self.moments[:half:2] + self.moments[half:]

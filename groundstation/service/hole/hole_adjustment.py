@@ -78,12 +78,13 @@ class HoleAdjustment:
         if not len(rows):
             return None
         path = self.path_of(mds, collar)
-        seen = self._looked_at(table[rows], station_of_row[rows], path.md)
+        forces = stops.mean_forces(rows)
+        seen = self._looked_at(table[rows], forces, station_of_row[rows], path.md)
         start = self._start(table[rows], seen, path)
         return ExaminedHole(examine_hole(seen.looks, seen.string, path, seen.run, start=start), seen.run, seen.tubes)
 
-    def _looked_at(self, seen: Rows, station: Places, station_md: Array) -> LookedAt:
-        """Looks of rows of the table in the order of time, at their stations (m)."""
+    def _looked_at(self, seen: Rows, forces: Array, station: Places, station_md: Array) -> LookedAt:
+        """Looks of rows of the table in the order of time, with their mean forces, at their stations (m)."""
         numbers, which = number_values(seen["chain"])
         chains, hanging = [self._shared.chain(number) for number in numbers], Hanging()
         hung = np.array([hanging.add_chain(chain) for chain in chains], np.intp)[which]
@@ -93,7 +94,7 @@ class HoleAdjustment:
         causes = causes_of_turns(hanging, chains, variances, mount_var)
         tube_of, make_up = np.ascontiguousarray(hung[:, 0]), np.ascontiguousarray(hung[:, 1])
         unknown = UNKNOWN_YAW_VAR * (seen["trust"] == Trust.UNKNOWN_YAW)
-        stop, force = stop_numbers(seen["at"]), np.ascontiguousarray(seen["force"])
+        stop, force = stop_numbers(seen["at"]), np.ascontiguousarray(forces)
         noise, yaw = noise_of(seen, tube_of), seen["yaw"].copy()
         looks = Looks(station, tube_of, make_up, stop, force, noise, yaw, seen["yaw_var"] + unknown)
         first = np.searchsorted(stop, np.arange(stop[-1] + 1))
@@ -122,9 +123,9 @@ class HoleAdjustment:
         earlier = np.flatnonzero(looks.stop < int(looks.stop[-1]) // STOPS_KEPT * STOPS_KEPT)
         used, station = np.unique(looks.station[earlier], return_inverse=True)
         above = replace(path, md=path.md[np.concatenate([[0], used])])
-        made_of = rows[earlier].tobytes() + above.md.tobytes()
+        made_of = rows[earlier].tobytes() + looks.force[earlier].tobytes() + above.md.tobytes()
         if self._kept is None or self._kept[0] != made_of:
-            part = self._looked_at(rows[earlier], station.astype(np.intp) + 1, above.md)
+            part = self._looked_at(rows[earlier], looks.force[earlier], station.astype(np.intp) + 1, above.md)
             self._kept = made_of, adjust_hole(part.looks, part.string, above).now
         return grown_start(self._kept[1], used, len(path.md), seen.string)
 

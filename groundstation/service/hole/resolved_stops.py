@@ -33,7 +33,6 @@ ROW: Final = np.dtype(
         *((name, np.uint32) for name in ("tube", "width", "chain")),
         *((name, np.uint8) for name in ("trust", "quality")),
         *((name, np.float64) for name in ("at", "md", "yaw", "yaw_var", "systematic_var", "force_var", "settle_time")),
-        ("force", np.float64, AXES),
         ("lean", np.float64, 2),
         ("down", np.float64),
         ("cov", np.float64, (2, 2)),
@@ -156,6 +155,13 @@ class ResolvedStops:
     def column(self, name: str) -> npt.NDArray[Any]:
         """One number of every stop, (n,) or (n, ...): a look at the table."""
         return self.rows[name][: len(self.forces)]
+
+    def mean_forces(self, numbers: npt.NDArray[np.intp]) -> Array:
+        """Mean specific force (n, 3), m/s^2, of the IMUs of the stops in several rows."""
+        kept = [self.forces[number] for number in numbers.tolist()]
+        if len({*map(len, kept)}) == 1:
+            return np.asarray(np.frombuffer(b"".join(kept)).reshape(len(kept), -1, AXES).mean(axis=1))
+        return np.array([np.frombuffer(one).reshape(-1, AXES).mean(axis=0) for one in kept])
 
     def direction(self, row: int) -> Direction:
         """Direction of the stop in a row, with its columns."""

@@ -113,8 +113,7 @@ class Resolver:
         quality = check_all(forces, covs, combined, self._gravity, sent["samples"], sent["settle_time"], self._noise)
         whole_vars = (sent["yaw_var"] + sent["systematic_var"]).tolist()
         found = with_yaws_of(resolved, whole_vars, sent["trust"].tolist())
-        rows["force"][own], rows["lean"][own], rows["down"][own] = combined[0], found.lean, found.down
-        rows["cov"][own] = found.cov
+        rows["lean"][own], rows["down"][own], rows["cov"][own] = found.lean, found.down, found.cov
         rows["quality"][own], rows["force_var"][own] = quality, force_vars(covs)
         for row, each in zip(own, forces, strict=True):
             stops.forces[row] = each.tobytes()

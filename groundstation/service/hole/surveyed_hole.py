@@ -53,6 +53,7 @@ class SurveyedHole:
         self._config = config
         self._shared = shared
         self._setup = setup
+        self._is_adjusted = config.weighting is Weighting.ADJUSTED
         self._design = config.design
         self.version = 0  # grows with every survey
         self.newest = 0  # number of the measurement that came last, revisions included
@@ -77,6 +78,7 @@ class SurveyedHole:
         self._trajectory = Trajectory(collar=self._collar, wander=self._config.wander, keeps_columns=False)
         self._deviations = self._deviate()
         self._projection: ProjectedEnd | None = None
+        self._is_foreseen = True  # whether the projection is that of the trajectory
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
         self._newest_at = -math.inf  # s, rig time of the newest survey
 
@@ -87,8 +89,7 @@ class SurveyedHole:
         """
         at, md = stops.rows["at"].item(row), stops.rows["md"].item(row)
         if self._history.begins_stop(epoch, at):
-            self.settle()
-            self._history.add(self._deviations, self._projection)
+            self._history.add(self.deviations, self.projection)
         stops.rows["number"][row] = self.newest + 1
         station = self._station_at(md)
         revised = station.stops.revised_by(stops, row)
@@ -134,7 +135,7 @@ class SurveyedHole:
     @property
     def alarms(self) -> AlarmList:
         """Levels of the tolerance that were reached."""
-        self.settle()
+        self._foresee()
         return self._alarms
 
     @property
@@ -167,7 +168,7 @@ class SurveyedHole:
     @property
     def is_adjusted(self) -> bool:
         """Whether all readings of the hole are adjusted in one, and not fused station by station."""
-        return self._config.weighting is Weighting.ADJUSTED
+        return self._is_adjusted
 
     @property
     def examined(self) -> ExaminedHole | None:
@@ -191,7 +192,7 @@ class SurveyedHole:
 
     def _found(self, station: SurveyStation) -> Direction:
         """Direction of a station without transport; that of the collar is the collar's where the hole is adjusted."""
-        if not self.is_adjusted:
+        if not self._is_adjusted:
             return station.fused(self._config.weighting)
         return self._adjusted.get(station.md, self._collar)
 
@@ -233,14 +234,14 @@ class SurveyedHole:
     @property
     def projection(self) -> ProjectedEnd | None:
         """Where the hole ends, if it goes on as it tends to; None before the first station."""
-        self.settle()
+        self._foresee()
         return self._projection
 
     def settle(self) -> None:
         """Work out what follows from the stops that have come since the last time."""
         since, self._unsettled_since = self._unsettled_since, math.inf
         if since < math.inf:
-            self._work_out(self._adjust() if self.is_adjusted else self._fuse(since))
+            self._work_out(self._adjust() if self._is_adjusted else self._fuse(since))
 
     def _adjust(self) -> list[SurveyStation]:
         """Adjust the hole; all of its stations have changed."""
@@ -267,13 +268,18 @@ class SurveyedHole:
         self._trajectory.put(self._directions(changed), depths)
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)
-        if worst is None:
-            return
-        self._projection = project_to_target(
-            self._trajectory[-1], self.direction_of(self._stations[-1]), self._learn(), self._design
-        )
-        self._alarms.judge_deviation(worst, self._newest_at)
-        self._alarms.judge_projection(self._projection, self._newest_at)
+        if worst is not None:
+            self._alarms.judge_deviation(worst, self._newest_at)
+            self._is_foreseen = False
+
+    def _foresee(self) -> None:
+        """Project the hole as it is worked out to its end, when that is asked for: it takes as long as all the rest."""
+        self.settle()
+        if not self._is_foreseen:
+            self._is_foreseen = True
+            here, direction = self._trajectory[-1], self.direction_of(self._stations[-1])
+            self._projection = project_to_target(here, direction, self._learn(), self._design)
+            self._alarms.judge_projection(self._projection, self._newest_at)
 
     def _learn(self) -> CurvatureTendency:
         """How the hole bends, by the directions along it."""
@@ -287,7 +293,9 @@ class SurveyedHole:
         one below too.
         """
         if not self.has_transport:
-            return [(one.md, self._found(one)) for one in changed if one.md > 0.0]
+            if self._is_adjusted:
+                return [*self._adjusted.items()]
+            return [(one.md, one.fused(self._config.weighting)) for one in changed if one.md > 0.0]
         measured = [(one.md, self._found(one)) for one in self._below]
         if not measured:
             return []

@@ -9,13 +9,15 @@ from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
 from groundstation.survey.fusion.resolve import known_direction
+from groundstation.survey.path.curvature_prior import CurvaturePrior
+from groundstation.survey.path.curvature_tendency import learn_curvature
 from groundstation.survey.wall.column_deviation import (
     PRESETS,
     ColumnDesign,
     axis_deviations,
     planes_across,
-    project_to_target,
 )
+from groundstation.survey.wall.projected_end import project_to_target
 from groundstation.survey.well.trajectory import TrajectoryPoint
 from groundstation.survey.well.well_plan import PlanLeg, WellPlan
 
@@ -165,7 +167,10 @@ def test_a_hole_on_its_plan_is_projected_to_its_end() -> None:
     point = TrajectoryPoint(
         44.0, at.tangents[0], at.points[0] + np.array([3.0, 0.0, 0.0]), 1e-6 * np.eye(3), np.zeros((3, 0))
     )
-    found = project_to_target(point, known_direction(30.0 * DEG, 0.0), design)
+    straight = np.tile(at.tangents[0], (6, 1))
+    prior = CurvaturePrior(np.array([1e-9]), np.array([400.0]), np.ones((1, 1)), np.zeros(1), np.ones(1), 1e-9, 1e6)
+    tendency = learn_curvature(2.0 * np.arange(6), straight, np.zeros((6, 3, 3)), prior)
+    found = project_to_target(point, known_direction(30.0 * DEG, 0.0), tendency, design).ends
     assert found.md == pytest.approx(50.0)
     assert found.along == pytest.approx(50.0)
     assert found.size == pytest.approx(0.0, abs=1e-9)
