@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from schemas import check_answers, shown_on
-from test_model import Placed, inclination_deg, knowing, passes
+from test_model import Placed, inclination_deg, knowing, passes, survey
 from test_surveyed_biases import MILLI_G, STOPS, Drilled
 
 from groundstation.config import GroundConfig
@@ -158,3 +158,18 @@ def test_the_setup_of_an_adjusted_hole_has_the_costs_of_the_adjustment(tmp_path:
     for tube in (1, 2, 3):
         assert items[f"mount.{tube}"] == pytest.approx(toe["tilt", f"tube {tube}"], rel=0.01)
     assert items["play"] == pytest.approx(toe["play", ""], rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stops", [15, 17])
+def test_many_looks_of_few_or_more_stops_are_adjusted_the_same_in_any_order(tmp_path: Path, stops: int) -> None:
+    """From 1500 looks on an adjustment begins where one of the first 16 stops ended, if there were so many."""
+    tubes = 101
+    placed = [
+        (survey(tube, stop, tubes - tube + 1, 1.0 + 0.01 * (stop + tubes - tube)), 2.0 * (stop + tubes - tube))
+        for stop in range(1, stops + 1)
+        for tube in range(1, tubes + 1)
+    ]
+    assert len(placed) > 1500
+    one, other = (numbers_of(knowing(tmp_path, each, tubes)) for each in (placed, placed[::-1]))
+    assert one == other

@@ -19,10 +19,11 @@ from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.hole.examined_hole import ExaminedHole, std_across
 from groundstation.service.setup.setup_priors import north_std
 from groundstation.service.setup.toe_costs import TURN_MOST
+from groundstation.survey.adjustment.blunder_words import STANDARD_GRAVITY
 from groundstation.survey.adjustment.blunders import Blunder
 from groundstation.survey.adjustment.tube_biases import bias_of_tube
 
-MILLI_G = 9.80665e-3  # m/s^2
+MILLI_G = 1e-3 * STANDARD_GRAVITY  # m/s^2
 LEAST_SHOWN_CM = 1e-4  # of a share
 
 

@@ -121,6 +121,8 @@ class HoleAdjustment:
         if len(looks) < MANY:
             return None
         earlier = np.flatnonzero(looks.stop < int(looks.stop[-1]) // STOPS_KEPT * STOPS_KEPT)
+        if not len(earlier):
+            return None  # many tubes, and few stops yet
         used, station = np.unique(looks.station[earlier], return_inverse=True)
         above = replace(path, md=path.md[np.concatenate([[0], used])])
         made_of = rows[earlier].tobytes() + looks.force[earlier].tobytes() + above.md.tobytes()
