@@ -220,7 +220,8 @@ def wall(file: str | Path) -> JudgedWall:
     SurveyError
         When the file or one that it names cannot be used.
     """
-    from groundstation.survey.wall.wall_file import judge_wall, read_wall
+    from groundstation.survey.wall.judged_wall import judge_wall
+    from groundstation.survey.wall.wall_file import read_wall
     from groundstation.survey.wall.wall_joints import worst_joint
 
     found = read_wall(Path(file))

@@ -12,7 +12,8 @@ from forked_commands import run
 from groundstation.report.column_report import ColumnRecord, column_report
 from groundstation.report.document import Document, Origin, ReportSection, report_pages, report_pdf
 from groundstation.report.wall_report import column_records, site_of, wall_report
-from groundstation.survey.wall.wall_file import Wall, judge_wall, read_wall
+from groundstation.survey.wall.judged_wall import judge_wall
+from groundstation.survey.wall.wall_file import Wall, read_wall
 from groundstation.survey.wall.wall_verdict import Judgement
 
 DAY = date(2026, 11, 20)

@@ -11,8 +11,9 @@ from hand_fed import Rig
 from groundstation.errors import SurveyError
 from groundstation.service.answers.wall_views import survey_of
 from groundstation.service.hole.live_wall import LiveWall
+from groundstation.survey.wall.judged_wall import judge_wall
 from groundstation.survey.wall.wall_columns import ColumnSurvey
-from groundstation.survey.wall.wall_file import Wall, judge_wall, read_wall
+from groundstation.survey.wall.wall_file import Wall, read_wall
 from groundstation.survey.wall.wall_verdict import Judgement
 
 SPACING, LENGTH, STEP = 0.75, 8.0, 2.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 import tomllib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,6 @@ from groundstation.survey.wall.wall_frames import FRAMES, NORTH_ANGLES, ORIGIN, 
 from groundstation.survey.wall.wall_joints import Detour, neighbours_in_grid, neighbours_in_line
 from groundstation.survey.wall.wall_stations import read_holes
 from groundstation.survey.wall.wall_tables import Defaults, Remedy, read_heads
-from groundstation.survey.wall.wall_verdict import DIAGONAL, Judgement, judge_columns
 from groundstation.survey.well.depth_reference import DEPTHS_FROM
 from groundstation.survey.well.methods import Method
 from groundstation.survey.well.reference_frames import SiteGrid
@@ -305,58 +304,6 @@ def read_wall(path: Path) -> Wall:
     detours = _detours(file.heads, names, [row.remedy for row in rows], pairs)
     _check_design(file, plans, built, pairs, {detour.joint for detour in detours})
     return Wall(file, plans, built, pairs, detours, holes, [row.drilled_on for row in rows])
-
-
-def judge_wall(wall: Wall, about: int | None = None) -> Judgement:
-    """Judge a wall by what its file requires; of a grid only voids beside the column ``about``, if one is given."""
-    return judge_columns(
-        wall.columns,
-        wall.pairs,
-        wall.file.thickness,
-        allowed=wall.file.allowed,
-        grid_spacing=wall.grid_spacing,
-        detours=wall.detours,
-        asked=wall.asked,
-        about=about,
-    )
-
-
-def part_around(wall: Wall, own: int) -> tuple[Wall, int]:
-    """The part of a wall that one column has to do with, in the planes of the whole, and its place there.
-
-    That are the joints of the column with their ways by remedial columns, and of a grid all columns that may stand
-    about a void beside it.
-
-    Raises
-    ------
-    SurveyError
-        When the column has no joint.
-    """
-    used = {detour.joint for detour in wall.detours if own in detour.pairs}
-    joints = [j for j, pair in enumerate(wall.pairs.tolist()) if own in pair or j in used]
-    if not joints:
-        raise SurveyError(f"{wall.file.path}: column {wall.plans[own].design.name} has no neighbour")
-    detours = [detour for detour in wall.detours if detour.joint in joints]
-    members = {own, *wall.pairs[joints].ravel().tolist()}
-    members |= {int(k) for detour in detours for k in detour.pairs.ravel()}
-    if wall.grid_spacing is not None:
-        away = np.linalg.norm(wall.columns.designs - wall.columns.designs[own], axis=1)
-        members |= set(np.flatnonzero(away <= 2.0 * DIAGONAL * wall.grid_spacing).tolist())
-    kept = sorted(members)
-    new = {k: place for place, k in enumerate(kept)}
-    part = replace(
-        wall,
-        plans=[wall.plans[k] for k in kept],
-        holes=[wall.holes[k] for k in kept],
-        drilled_on=[wall.drilled_on[k] for k in kept],
-        pairs=_renumbered(wall.pairs[joints], new),
-        detours=[Detour(joints.index(detour.joint), _renumbered(detour.pairs, new)) for detour in detours],
-    )
-    return part, new[own]
-
-
-def _renumbered(pairs: npt.NDArray[np.intp], new: dict[int, int]) -> npt.NDArray[np.intp]:
-    return np.array([[new[k] for k in pair] for pair in pairs.tolist()], np.intp).reshape(-1, 2)
 
 
 def _pairs(file: WallFile, remedies: list[Remedy], built: BuiltWall) -> npt.NDArray[np.intp]:

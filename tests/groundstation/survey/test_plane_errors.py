@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.wall.column_deviation import ColumnDesign
+from groundstation.survey.wall.judged_wall import judge_wall
 from groundstation.survey.wall.plane_errors import PlaneErrors
 from groundstation.survey.wall.wall_columns import (
     Assumptions,
@@ -20,7 +21,7 @@ from groundstation.survey.wall.wall_columns import (
     reduce_error_columns,
 )
 from groundstation.survey.wall.wall_errors import COLUMNS, PLACES, batch_groups
-from groundstation.survey.wall.wall_file import judge_wall, read_wall
+from groundstation.survey.wall.wall_file import read_wall
 
 
 @given(st.integers(0, 10_000), st.integers(2, 8), st.integers(0, 40))

@@ -14,7 +14,8 @@ from groundstation.survey.requests.survey_request import FrameRequest, SurveyReq
 from groundstation.survey.requests.survey_tables import station_table_text
 from groundstation.survey.requests.wall_result import wall_result
 from groundstation.survey.wall.as_built import ColumnState
-from groundstation.survey.wall.wall_file import judge_wall, read_wall
+from groundstation.survey.wall.judged_wall import judge_wall
+from groundstation.survey.wall.wall_file import read_wall
 
 DEG = math.pi / 180.0
 ANGLES = {"site": 23.0, "true": 0.0, "grid": -1.5, "magnetic": 4.25}  # deg, of each north from true north

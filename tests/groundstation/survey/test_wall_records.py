@@ -8,7 +8,8 @@ import pytest
 import walls_by_sampling as sampling
 
 from groundstation.errors import SurveyError
-from groundstation.survey.wall.wall_file import judge_wall, read_wall
+from groundstation.survey.wall.judged_wall import judge_wall
+from groundstation.survey.wall.wall_file import read_wall
 
 DEG = math.pi / 180.0
 RADIUS, THICKNESS, SPACING, LENGTH, STEP = 0.6, 0.8, 0.75, 14.0, 2.0
