@@ -84,7 +84,7 @@ class ReadingParts(NamedTuple):
     tubes_below: float  # on the mean of the readings
 
 
-@lru_cache(maxsize=128)  # the next stop has the patterns of this one, one station further down
+@lru_cache(maxsize=32)  # the next stop has the patterns of this one, one station further down
 def reading_parts(counts: tuple[int, ...], deepest: bytes) -> ReadingParts:
     """Parts for readings with so many places each; ``deepest`` are those of the reading that has most."""
     places = np.frombuffer(deepest, np.intp)
