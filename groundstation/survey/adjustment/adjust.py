@@ -24,13 +24,14 @@ from groundstation.survey.adjustment.equations import (
 from groundstation.survey.adjustment.kernels.observations import add_looks, linearise_looks
 from groundstation.survey.adjustment.kernels.path_elimination import eliminate_path, substitute_path
 from groundstation.survey.adjustment.looks import OF_TUBE, FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
-from groundstation.survey.adjustment.play import PLAY_KNOWN_AS, learnt_play
+from groundstation.survey.adjustment.play import PLAY_KNOWN_AS, faster_play, learnt_play
 from groundstation.survey.adjustment.sphere import carried_bases, step_directions
 from groundstation.survey.adjustment.starting_point import first_start
 
 Array = npt.NDArray[np.float64]
 ITERATIONS = 12
-SETTLED = 1e-3  # standard deviations, of the last step
+SETTLED = 1e-2  # standard deviations, of the last step; what is left then is a thirtieth of it
+NEAR = 3.0  # standard deviations, of a step from which on the play is not that of unknowns still on their way
 PLAY_SETTLED = 0.02  # of its variance
 GROSS = 16.27  # chi-square of three beyond which a look counts less: one in a thousand
 
@@ -61,6 +62,7 @@ def adjust_hole(
     if len(now.extra) != len(extra.std):
         now = replace(now, extra=np.zeros(len(extra.std)))
     known = string_information(string, extra)
+    tried: list[tuple[float, float]] = []
     for _ in range(ITERATIONS):
         bases = carried_bases(now.tangents)
         linear = linearise_all(looks, now, bases, extra)
@@ -72,7 +74,8 @@ def adjust_hole(
         play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)
         if solution.step < SETTLED and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var:
             break
-        now = replace(now, play_var=play)
+        tried = [*tried, (now.play_var, play)] if solution.step < NEAR else []
+        now = replace(now, play_var=faster_play(tried) if tried else play)
     return found
 
 
