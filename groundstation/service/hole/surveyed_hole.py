@@ -71,6 +71,7 @@ class SurveyedHole:
         self._movement = Movement(self._stops, self._station_of)
         self._adjustment = HoleAdjustment(self._config, self._shared)
         self._examined: tuple[int, ExaminedHole | None] = (0, None)  # of the version that it is of
+        self._is_unsolved = False
         self._adjusted: dict[float, Direction] = {}  # by the depth (m) of a station, where the hole is adjusted
         self._alarms = AlarmList()
         self._history = History()
@@ -172,7 +173,7 @@ class SurveyedHole:
 
     @property
     def examined(self) -> ExaminedHole | None:
-        """The hole adjusted in one, and what is wrong with it; None before the first look at a station.
+        """The hole adjusted in one, and what is wrong with it; None before the first look at a station, or unsolved.
 
         Where the stations are fused one by one it stands beside them, and is worked out when it is asked for.
         """
@@ -181,9 +182,18 @@ class SurveyedHole:
             place = {id(one): number for number, one in enumerate(below, 1)}
             station_of_row = np.array([place.get(id(one), 0) for one in self._station_of], np.intp)
             mds = np.array([one.md for one in below])
-            found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar)
+            try:
+                found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar)
+                self._is_unsolved = False
+            except (np.linalg.LinAlgError, ArithmeticError):
+                found, self._is_unsolved = None, True
             self._examined = self.version, found
         return self._examined[1]
+
+    @property
+    def is_unsolved(self) -> bool:
+        """Whether its surveys have no solution in common, so that each station stands for itself."""
+        return self.examined is None and self._is_unsolved
 
     @property
     def _below(self) -> list[SurveyStation]:
@@ -246,7 +256,10 @@ class SurveyedHole:
     def _adjust(self) -> list[SurveyStation]:
         """Adjust the hole; all of its stations have changed."""
         self._touched, examined = {}, self.examined
-        found = [] if examined is None else directions_of(examined.adjusted, self._shared, north_std(self._setup))
+        if examined is None:
+            self._adjusted = {one.md: one.fused(Weighting.BAYES) for one in self._below}
+            return self._below
+        found = directions_of(examined.adjusted, self._shared, north_std(self._setup))
         self._adjusted = dict(zip([one.md for one in self._below], found, strict=True))
         return self._below
 

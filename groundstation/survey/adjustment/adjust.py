@@ -69,6 +69,8 @@ def adjust_hole(
         solution = solve_equations(
             looks, linear, path_equations(path, now, bases), known, string_departure(string, now), extra
         )
+        if not np.isfinite(solution.step):
+            raise np.linalg.LinAlgError("expected a step of the unknowns, got numbers that are none")
         now = _stepped(now, bases, solution)
         found = Adjusted(looks, string, path, extra, now, linear, solution, known)
         play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)

@@ -47,10 +47,10 @@ class LinearSolution:
 
     @property
     def step(self) -> float:
-        """Largest step of an unknown in its standard deviations, at most as the equations know them."""
+        """Largest step of an unknown in its standard deviations, at most as the equations know them; NaN if one is."""
         of_common = np.max(np.abs(self.common) / np.sqrt(np.diag(self.cov)), initial=0.0)
         rigid = np.einsum("kab,kab->ka", self.diagonal, self.diagonal)  # of what is left of each block
-        return float(max(of_common, np.max(np.abs(self.states) * np.sqrt(rigid))))
+        return float(np.maximum(of_common, np.max(np.abs(self.states) * np.sqrt(rigid))))
 
 
 @dataclass(frozen=True)  # with a dictionary, for what is worked out once
