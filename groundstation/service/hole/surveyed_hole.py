@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, insort
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from operator import attrgetter
 
 import numpy as np
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from groundstation.config import GroundConfig
 from groundstation.service.hole.deviation_alarms import AlarmList
 from groundstation.service.hole.examined_hole import ExaminedHole
-from groundstation.service.hole.history import History
+from groundstation.service.hole.history import History, Moment
 from groundstation.service.hole.hole_adjustment import HoleAdjustment, directions_of
 from groundstation.service.hole.movement import Moved, Movement
 from groundstation.service.hole.resolved_stops import ResolvedStops
@@ -59,10 +59,17 @@ class SurveyedHole:
         self.newest = 0  # number of the measurement that came last, revisions included
         self._depth_errors = config.depth_errors
         self.begin_anew()
+        self.catch_up()
 
-    def begin_anew(self) -> None:
-        """Forget every stop; they are added again, as they are by what was told of the rig since."""
+    def begin_anew(self, kept: Iterable[Moment] = ()) -> None:
+        """Forget every stop; they are added again, as they are by what was told of the rig since, until caught up.
+
+        Parameters
+        ----------
+        kept : what was known at the end of stops, where it is to be had
+        """
         self.version += 1
+        self._is_behind = True
         self._collar = collar_direction(self._config, self._setup)
         self._stops = ResolvedStops()
         self._station_of: list[SurveyStation] = []  # of each of its rows
@@ -74,7 +81,7 @@ class SurveyedHole:
         self._is_unsolved = False
         self._adjusted: dict[float, Direction] = {}  # by the depth (m) of a station, where the hole is adjusted
         self._alarms = AlarmList()
-        self._history = History()
+        self._history = History(kept)
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
         self._trajectory = Trajectory(collar=self._collar, wander=self._config.wander, keeps_columns=False)
         self._deviations = self._deviate()
@@ -90,7 +97,7 @@ class SurveyedHole:
         """
         at, md = stops.rows["at"].item(row), stops.rows["md"].item(row)
         if self._history.begins_stop(epoch, at):
-            self._history.add(self.deviations, self.projection)
+            self._end_stop()
         stops.rows["number"][row] = self.newest + 1
         station = self._station_at(md)
         revised = station.stops.revised_by(stops, row)
@@ -106,6 +113,25 @@ class SurveyedHole:
         self._unsettled_since = min(self._unsettled_since, at)
         self._newest_at = max(self._newest_at, at)
         return True
+
+    def catch_up(self) -> None:
+        """Every stop that was known has been added; what was known at the end of each later one is worked out."""
+        self._is_behind = False
+
+    def _end_stop(self) -> None:
+        """Keep what is known at the end of a stop. What is kept of one already is judged as it was judged then."""
+        history = self._history
+        if not (self._is_adjusted and self._is_behind):
+            history.add(self.deviations, self.projection)
+        elif (kept := history.take_over()) is not None:
+            if len(kept.where) > 1:
+                self._alarms.judge_deviation(kept.worst(first=1), kept.at)
+            if (end := kept.projection) is not None:
+                self._alarms.judge_projection(end, kept.at)
+        elif history.is_worth(len(self._stops)):
+            history.add(self.deviations, self.projection)
+        else:
+            history.pass_over()
 
     def has_untrusted(self, tube: int) -> bool:
         """Whether the yaw of any measurement of a tube is not believed."""

@@ -42,7 +42,7 @@ def carry_bases(tangents: Array, bases: Array) -> None:
 @kernel
 def inner(one: Array, other: Array) -> float:
     """Product of two vectors (3,)."""
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+    return float(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
 
 
 @kernel
