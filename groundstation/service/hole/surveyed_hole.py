@@ -54,6 +54,7 @@ class SurveyedHole:
         self._config = config
         self._shared = shared
         self._setup = setup
+        self._searches_apart = False
         self._is_adjusted = config.weighting is Weighting.ADJUSTED
         self._design = config.design
         self.version = 0  # grows with every survey
@@ -80,6 +81,8 @@ class SurveyedHole:
         self._moved: list[Moved] = []  # of the adjusted hole
         self._surveyed_back: list[float] = []  # m, in it
         self._adjustment = HoleAdjustment(self._config, self._shared)
+        if self._searches_apart:
+            self._adjustment.search_apart()
         self._examined: tuple[int, ExaminedHole | None] = (0, None)  # of the version that it is of
         self._is_unsolved = False
         self._adjusted: dict[float, Direction] = {}  # by the depth (m) of a station, where the hole is adjusted
@@ -122,6 +125,23 @@ class SurveyedHole:
         self._touched[station.md] = station
         self._unsettled_since = min(self._unsettled_since, at)
         self._newest_at = max(self._newest_at, at)
+        return True
+
+    def search_apart(self) -> None:
+        """From now on look for what is wrong on a thread of its own, so that no question waits for it."""
+        self._searches_apart = True
+        self._adjustment.search_apart()
+
+    def adopt_found(self) -> bool:
+        """Take over what a search of its own has found since the last time; whether it has."""
+        ended = self._adjustment.take_found()
+        if ended is None:
+            return False
+        number, found = ended
+        self.version += 1
+        if number == self.newest:
+            self._examined = self.version, found
+        self._unsettled_since = min(self._unsettled_since, self._newest_at)
         return True
 
     def catch_up(self) -> None:
@@ -223,7 +243,7 @@ class SurveyedHole:
             station_of_row = np.array([place.get(id(one), 0) for one in self._station_of], np.intp)
             mds = np.array([one.md for one in below])
             try:
-                found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar)
+                found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar, self.newest)
                 self._is_unsolved = False
             except (np.linalg.LinAlgError, ArithmeticError):
                 found, self._is_unsolved = None, True
