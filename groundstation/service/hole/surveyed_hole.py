@@ -32,6 +32,7 @@ from groundstation.survey.fusion.survey_trust import Trust
 from groundstation.survey.fusion.tangents import tangents_of
 from groundstation.survey.fusion.transport import Carried, carry_directions
 from groundstation.survey.path.curvature_tendency import CurvatureTendency, learn_curvature
+from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.wall.column_deviation import Deviations, axis_deviations
 from groundstation.survey.wall.projected_end import ProjectedEnd, project_to_target
 from groundstation.survey.well.depth_errors import mean_depth
@@ -332,6 +333,10 @@ class SurveyedHole:
         self._adjusted = dict(zip([one.md for one in below], found, strict=True))
         self._adjusted_collar = at_collar
         self._trajectory = self._drawn_from(at_collar)
+        now = examined.adjusted.now
+        driven = now.leg_vars / now.curvature_var
+        driven[:-1] = np.maximum(driven[:-1], driven[1:])  # what bends sharply may have begun above the station
+        self._trajectory.bend_as(LegWander(math.sqrt(now.curvature_var), self._config.curvature_length), driven)
         self._moved = moved_stations(examined, below)
         self._surveyed_back = self._points_back(below)
         return below

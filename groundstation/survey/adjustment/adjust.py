@@ -64,7 +64,7 @@ def adjust_hole(
     now = start or first_start(looks, string, path)
     if len(now.extra) != len(extra.std):
         now = replace(now, extra=np.zeros(len(extra.std)))
-    known = string_information(string, extra)
+    known, is_learnt = string_information(string, extra), now.is_learnt
     tried: list[tuple[float, float]] = []
     for _ in range(ITERATIONS):
         bases = carried_bases(now.tangents)
@@ -76,6 +76,10 @@ def adjust_hole(
             raise np.linalg.LinAlgError("expected a step of the unknowns, got numbers that are none")
         now = _stepped(now, bases, solution)
         found = Adjusted(looks, string, path, extra, now, linear, solution, known)
+        if is_learnt:
+            if solution.step < SETTLED:
+                break
+            continue
         play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)
         whole, legs = learnt_curvature(found)
         is_bent = bool(np.all(np.abs(legs - now.leg_vars) <= LEGS_SETTLED * now.leg_vars))

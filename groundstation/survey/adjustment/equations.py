@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,7 +47,7 @@ def path_equations(path: PathPrior, start: StartingPoint, bases: Array) -> tuple
     off = bends_between(np.stack([start.tangents[0], path.collar]), bases[:1].repeat(2, axis=0))[0]
     diagonal[0, :2, :2] += collar
     right[0, :2] += collar @ off
-    rigid = path.curvature_std**-2
+    rigid = 1.0 / start.curvature_var
     diagonal[0, 2:, 2:] += rigid * np.eye(2)
     right[0, 2:] -= rigid * start.curvatures[0]
     if count > 1:
@@ -64,7 +65,12 @@ def path_equations(path: PathPrior, start: StartingPoint, bases: Array) -> tuple
 
 def leg_steps(path: PathPrior) -> tuple[Array, Array]:
     """How the state of a station goes on to the next (s, 4, 4), and the information (s, 4, 4) of a curvature of 1."""
-    steps = [process_step(length, path.correlation_length) for length in np.diff(path.md).tolist()]
+    return _steps_of_legs(np.diff(path.md).tobytes(), path.correlation_length)
+
+
+@functools.lru_cache(maxsize=4)  # the same for every iteration
+def _steps_of_legs(lengths: bytes, correlation_length: float) -> tuple[Array, Array]:
+    steps = [process_step(length, correlation_length) for length in np.frombuffer(lengths).tolist()]
     go = np.array([step[0][1:, 1:] for step in steps]).reshape(-1, 2, 2)
     noise = np.array([step[1][1:, 1:] for step in steps]).reshape(-1, 2, 2)
     return _for_both_axes(go), _for_both_axes(np.asarray(np.linalg.inv(noise), np.float64))
