@@ -32,7 +32,7 @@ from groundstation.survey.adjustment.starting_point import first_start
 
 Array = npt.NDArray[np.float64]
 ITERATIONS = 12
-SETTLED = 1e-2  # standard deviations, of the last step; what is left then is a thirtieth of it
+SETTLED = 0.03  # standard deviations, of the last step; what is left then is some tenth of it
 NEAR = 3.0  # standard deviations, of a step from which on the play is not that of unknowns still on their way
 PLAY_SETTLED = 0.02  # of its variance
 LEGS_SETTLED = 0.1  # of the variance of each leg
@@ -76,17 +76,16 @@ def adjust_hole(
             raise np.linalg.LinAlgError("expected a step of the unknowns, got numbers that are none")
         now = _stepped(now, bases, solution)
         found = Adjusted(looks, string, path, extra, now, linear, solution, known)
-        if is_learnt:
-            if solution.step < SETTLED:
-                break
-            continue
-        play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)
-        whole, legs = learnt_curvature(found)
-        is_bent = bool(np.all(np.abs(legs - now.leg_vars) <= LEGS_SETTLED * now.leg_vars))
-        if solution.step < SETTLED and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var and is_bent:
+        if not is_learnt:
+            play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)
+            whole, legs = learnt_curvature(found)
+            is_bent = bool(np.all(np.abs(legs - now.leg_vars) <= LEGS_SETTLED * now.leg_vars))
+            is_learnt = solution.step < NEAR and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var and is_bent
+        if is_learnt and solution.step < SETTLED:
             break
-        tried = [*tried, (now.play_var, play)] if solution.step < NEAR else []
-        now = replace(now, play_var=faster_play(tried) if tried else play, curvature_var=whole, leg_vars=legs)
+        if not is_learnt:
+            tried = [*tried, (now.play_var, play)] if solution.step < NEAR else []
+            now = replace(now, play_var=faster_play(tried) if tried else play, curvature_var=whole, leg_vars=legs)
     return found
 
 
