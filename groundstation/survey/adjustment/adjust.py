@@ -34,7 +34,8 @@ Array = npt.NDArray[np.float64]
 ITERATIONS = 12
 SETTLED = 1e-3  # standard deviations, of the last step
 PLAY_SETTLED = 0.02  # of its variance
-LEGS_SETTLED = 0.1  # of the variance of each leg
+LEGS_SETTLED = 0.2  # of the logarithm of the variance of each leg
+PART = 0.75
 GROSS = 16.27  # chi-square of three beyond which a look counts less: one in a thousand
 
 
@@ -63,8 +64,8 @@ def adjust_hole(
     now = start or first_start(looks, string, path)
     if len(now.extra) != len(extra.std):
         now = replace(now, extra=np.zeros(len(extra.std)))
-    known = string_information(string, extra)
-    for _ in range(ITERATIONS):
+    known, is_bent = string_information(string, extra), False
+    for again in range(ITERATIONS):
         bases = carried_bases(now.tangents)
         linear = linearise_all(looks, now, bases, extra)
         solution = solve_equations(
@@ -73,12 +74,21 @@ def adjust_hole(
         now = _stepped(now, bases, solution)
         found = Adjusted(looks, string, path, extra, now, linear, solution, known)
         play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)
-        whole, legs = learnt_curvature(found)
-        is_bent = bool(np.all(np.abs(legs - now.leg_vars) <= LEGS_SETTLED * now.leg_vars))
+        if again and not is_bent:  # the first step was not along the sphere
+            whole, legs = learnt_curvature(found)
+            is_bent = bool(np.all(np.abs(np.log(legs / now.leg_vars)) <= LEGS_SETTLED))
         if solution.step < SETTLED and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var and is_bent:
             break
-        now = replace(now, play_var=play, curvature_var=whole, leg_vars=legs)
+        now = replace(now, play_var=play)
+        if again and not is_bent:
+            whole, legs = (part_of_way(*pair) for pair in ((now.curvature_var, whole), (now.leg_vars, legs)))
+            now = replace(now, curvature_var=float(whole), leg_vars=legs)
     return found
+
+
+def part_of_way(before: Array | float, after: Array | float) -> Array:
+    """Most of the way from variances to others, by their logarithms, for a whole step goes too far."""
+    return np.asarray(before * (after / before) ** PART)
 
 
 def linearise_all(looks: Looks, now: StartingPoint, bases: Array, extra: FurtherEffects) -> Linearised:
