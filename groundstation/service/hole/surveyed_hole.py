@@ -276,6 +276,8 @@ class SurveyedHole:
         self._adjusted_collar = at_collar
         self._trajectory = self._drawn_from(at_collar)
         self._moved = moved_stations(examined, below)
+        for station in self._stations:
+            station.forget_view()
         tangents = tangents_of([self._collar, *(one.fused(Weighting.BAYES) for one in below)])
         back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
         self._surveyed_back = [below[place].md for place in back.tolist()]
