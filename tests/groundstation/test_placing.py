@@ -9,6 +9,7 @@ import sqlalchemy as sa
 from hand_fed import COV, Rig
 
 from borechain.load.placing_calls import CALLS_AT_MOST, TUBES, count_placing_calls
+from groundstation.survey.fusion.fusion import Weighting
 from telemetry.messages import DepthReading, ImuMean, NodeFlag, Stand, SurveyMeasurement
 from telemetry.presentation.msgpack_codec import encode_message
 
