@@ -24,7 +24,7 @@ from groundstation.service.hole.movement import Moved, Movement
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
 from groundstation.service.setup.setup_book import SetupBook
-from groundstation.service.setup.setup_priors import collar_direction, north_std
+from groundstation.service.setup.setup_priors import collar_direction, depth_errors, length_stds, north_std
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
@@ -57,13 +57,13 @@ class SurveyedHole:
         self._design = config.design
         self.version = 0  # grows with every survey
         self.newest = 0  # number of the measurement that came last, revisions included
-        self._depth_errors = config.depth_errors
         self.begin_anew()
 
     def begin_anew(self) -> None:
         """Forget every stop; they are added again, as they are by what was told of the rig since."""
         self.version += 1
         self._collar = collar_direction(self._config, self._setup)
+        self._depth_errors = depth_errors(self._config, self._setup)
         self._stops = ResolvedStops()
         self._station_of: list[SurveyStation] = []  # of each of its rows
         self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
@@ -261,10 +261,11 @@ class SurveyedHole:
         return changed
 
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
-        depths, places_of = {}, self._stops.depth_places.__getitem__
+        depths, places_of, stds = {}, self._stops.depth_places.__getitem__, length_stds(self._setup)
+        told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()}
         for one in changed:
             places = [*map(places_of, one.stops.rows)]
-            depths[one.md] = mean_depth(one.md, places, self._depth_errors, self._config.tube_length)
+            depths[one.md] = mean_depth(one.md, places, self._depth_errors, self._config.tube_length, told)
         self._trajectory.put(self._directions(changed), depths)
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)

@@ -649,7 +649,7 @@ export interface SetupRow {
   /** name, such as north, joint.4-3 and mount.3 */
   item: string;
   /** what it is */
-  kind: "north" | "collar" | "joint" | "length" | "stick_up" | "mount" | "mount_turn" | "depth_scale" | "depth_offset" | "accelerometer" | "gyroscope" | "play" | "path" | "gravity";
+  kind: "north" | "collar" | "joint" | "length" | "stick_up" | "mount" | "mount_turn" | "depth_scale" | "accelerometer" | "gyroscope" | "play" | "path" | "gravity";
   /** tube, or joint as upper and lower tube; empty of what the rig has once */
   subject: string;
   /** one, of the collar inclination and azimuth; empty where it may be any */
