@@ -16,7 +16,8 @@ from groundstation.service.hole.resolving import Found
 from groundstation.service.string.stored import Stored
 from telemetry.messages import Event, Kept, StaticRecord, SurveyMeasurement
 
-CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column", "setup")
+CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column")
+ONCE_RESTED = ("adjustment", "setup")  # what all surveys say of each thing, which takes long to work out
 RESTORED_TOGETHER = 256  # messages
 
 
@@ -40,6 +41,8 @@ class Learner:
         self._arrived: list[Stored[Kept]] = []  # since the last transaction
         # alarms of the hole, moves and stops of the string that were told
         self._known: tuple[list[DeviationAlarm], int, int] = ([], 0, 0)
+        # versions of the hole at the last look, and as its adjustment was published
+        self._rested = self._shown = model.hole.version
         self._by_survey = CHANGED_BY_SURVEY if model.wall is None else (*CHANGED_BY_SURVEY, "wall")
 
     def take(self, message: Kept) -> None:
@@ -116,8 +119,20 @@ class Learner:
         """
         hole = self._hole
         before, self._known = self._known, (list(hole.alarms.alarms), len(hole.moved), hole.history.count)
-        paths = {"alarms": before[:2] != self._known[:2], "history": before[2] != self._known[2]}
+        paths = {
+            "alarms": before[:2] != self._known[:2],
+            "history": before[2] != self._known[2],
+            **dict.fromkeys(ONCE_RESTED, self._has_rested()),
+        }
         return [path for path, has_changed in paths.items() if has_changed]
+
+    def _has_rested(self) -> bool:
+        """Whether no survey has come since the last look, and some before."""
+        before, self._rested = self._rested, self._hole.version
+        if not before == self._rested != self._shown:
+            return False
+        self._shown = self._rested
+        return True
 
     def restore(self) -> None:
         """Go on with everything that was stored, some hundred messages at a time."""
@@ -154,7 +169,7 @@ class Learner:
                     self._hole.add_stop(*stop, self._string.epoch_of(measurement))
         self._followed = version
         self.find_consequences()
-        return sorted({*self._by_survey, "alarms", "history", "verdict", "status"})
+        return sorted({*self._by_survey, "setup", "alarms", "history", "verdict", "status"})
 
     def _restore_messages(self) -> None:
         """Learn everything that was stored."""

@@ -101,7 +101,12 @@ class Adjusted:
     @cached_property
     def columns(self) -> Array:
         """Change of every state (s + 1, 4, p) for one standard deviation of independent errors in common."""
-        return np.asarray(self.by_common @ np.linalg.cholesky(self.common_cov))
+        return np.asarray(self.by_common @ self.common_root)
+
+    @cached_property
+    def common_root(self) -> Array:
+        """Lower triangular root (p, p) of that covariance."""
+        return np.asarray(np.linalg.cholesky(self.common_cov))
 
     @cached_property
     def covs(self) -> Array:
