@@ -124,12 +124,11 @@ def budget_of_toe(k: RigModel, examined: ExaminedHole) -> list[NamedShare]:
     The last two are those of the trajectory, which are in no look.
     """
     shares = [NamedShare(*examined.share_name(one), one.variances) for one in examined.shares]
-    drawn, turned = k.hole.variances, north_at_toe(k)
     return [
-        NamedShare("north", "", turned),
+        NamedShare("north", "", north_at_toe(k)),
         *shares,
-        NamedShare("depth", "", drawn["depth"][-1]),
-        NamedShare("legs", "", drawn["path"][-1]),
+        NamedShare("depth", "", k.hole.toe_by_depth),
+        NamedShare("legs", "", np.diagonal(k.hole.trajectory.path_covs[-1])),
     ]
 
 

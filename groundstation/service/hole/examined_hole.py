@@ -12,17 +12,22 @@ from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunder_cost import BlunderCost, cost_blunders
 from groundstation.survey.adjustment.blunder_words import say_blunder
 from groundstation.survey.adjustment.blunders import Blunder, Examination, chance_of_one
-from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, toe_budget
+from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, prior_shares, toe_budget
 from groundstation.survey.adjustment.hypotheses import BlunderKind, Hypothesis
 from groundstation.survey.adjustment.least_found import LARGEST, possible_mistakes
 from groundstation.survey.adjustment.next_stop import NextStop, plan_stop
 from groundstation.survey.adjustment.reliability import Reliability, measure_reliability
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
-from groundstation.survey.adjustment.toe_weights import toe_weights
+from groundstation.survey.adjustment.toe_weights import position_weights, toe_weights
+from groundstation.survey.fusion.shared import KINDS
 
 Array = npt.NDArray[np.float64]
 LEVEL = 2  # of north, east and down those across a hole
 OF_TUBE = (ShareSource.BIAS, ShareSource.TILT)
+SOURCE_NAMES = {
+    ShareSource.BIAS: "accelerometer_bias", ShareSource.TILT: "mounts", ShareSource.COLLAR: "collar",
+    ShareSource.PATH: "path",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)  # with a dictionary, for what is worked out once
@@ -82,6 +87,18 @@ class ExaminedHole:
             return kind, f"tube {self.tubes[place]}" if place >= 0 else ""
         is_of_tube = share.source in OF_TUBE and share.subject >= 0
         return share.source.value, f"tube {self.tubes[share.subject]}" if is_of_tube else ""
+
+    @cached_property
+    def position_variances(self) -> dict[str, Array]:
+        """Variances (s + 1, 3), m^2, of collar and stations to north, east and down by what looks have in common."""
+        found: dict[str, Array] = {}
+        for share in prior_shares(self.adjusted, position_weights(self.adjusted), self.run.causes):
+            name = SOURCE_NAMES.get(share.source)
+            if share.source is ShareSource.TURN:
+                name = KINDS.get(self.share_name(share)[0], "joints")
+            if name is not None:
+                found[name] = found.get(name, 0.0) + share.variances.reshape(-1, 3)
+        return found
 
     @cached_property
     def next_stop(self) -> NextStop | None:

@@ -34,6 +34,7 @@ Places = npt.NDArray[np.intp]
 MANY = 1500  # looks, from which on an adjustment begins where an earlier one ended
 STOPS_KEPT = 16  # stops of the string between such beginnings
 OWN_SHARE = 0.2  # of a tube's noise that is taken from the stop itself: the variance of 32 readings is not exact
+FURTHER = 2 + 30  # columns of gravity, of north, and of what is wrong: two explanations of five blunders
 LOUD = 2.5  # times a tube's noise, from which on a stop is one at which it was shaken
 
 
@@ -59,6 +60,16 @@ class HoleAdjustment:
     def __init__(self, config: GroundConfig, shared: SharedErrors) -> None:
         self._config, self._shared = config, shared
         self._kept: tuple[bytes, StartingPoint] | None = None  # where an earlier adjustment ended, and of what looks
+        self._hanging, self._met = Hanging(), set[int]()  # chains of which there was a stop
+
+    def make_room(self, chain: int) -> None:
+        """Have the columns that a chain may need, in the order in which stops come and not in that of questions."""
+        if chain in self._met:
+            return
+        self._met.add(chain)
+        self._hanging.add_chain(self._shared.chain(chain))
+        tubes, make_ups = len(self._hanging.tubes), len(self._hanging.make_ups)
+        self._shared.adjusted_places(OF_TUBE * tubes + make_ups + FURTHER)
 
     def examine(
         self, stops: ResolvedStops, station_of_row: Places, mds: Array, collar: Direction
@@ -170,14 +181,14 @@ def noise_of(seen: Rows, tube_of: Places) -> Array:
 
 
 def directions_of(adjusted: Adjusted, shared: SharedErrors, north_std: float) -> list[SphereDirection]:
-    """Directions of the stations below the collar, from the top down.
+    """Directions of the collar and the stations below it, from the top down.
 
     The encoder's zero against north (rad) turns them all about the vertical and is in no look: it is one more column.
     """
-    bases, tangents = adjusted.bases[1:], adjusted.now.tangents[1:]
-    own = np.swapaxes(bases, 1, 2) @ adjusted.own_covs[1:, :2, :2] @ bases
+    bases, tangents = adjusted.bases, adjusted.now.tangents
+    own = np.swapaxes(bases, 1, 2) @ adjusted.own_covs[:, :2, :2] @ bases
     turned = north_std * np.stack([-tangents[:, 1], tangents[:, 0], np.zeros(len(tangents))], axis=1)
-    columns = np.concatenate([np.swapaxes(bases, 1, 2) @ adjusted.columns[1:, :2], turned[:, :, None]], axis=2)
+    columns = np.concatenate([np.swapaxes(bases, 1, 2) @ adjusted.columns[:, :2], turned[:, :, None]], axis=2)
     places = shared.adjusted_places(columns.shape[2])
     width = shared.count
     found = []

@@ -20,7 +20,7 @@ from groundstation.service.hole.deviation_alarms import AlarmList
 from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import History
 from groundstation.service.hole.hole_adjustment import HoleAdjustment, directions_of
-from groundstation.service.hole.movement import Moved, Movement
+from groundstation.service.hole.movement import Moved, Movement, moved_stations
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
 from groundstation.service.setup.setup_book import SetupBook
@@ -29,12 +29,13 @@ from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
 from groundstation.survey.fusion.survey_trust import Trust
+from groundstation.survey.fusion.tangents import tangents_of
 from groundstation.survey.fusion.transport import Carried, carry_directions
 from groundstation.survey.path.curvature_tendency import CurvatureTendency, learn_curvature
 from groundstation.survey.wall.column_deviation import Deviations, axis_deviations
 from groundstation.survey.wall.projected_end import ProjectedEnd, project_to_target
 from groundstation.survey.well.depth_errors import mean_depth
-from groundstation.survey.well.trajectory import Trajectory
+from groundstation.survey.well.trajectory import TURNED_BACK, Trajectory
 
 Array = npt.NDArray[np.float64]
 
@@ -69,18 +70,25 @@ class SurveyedHole:
         self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
         self._stations: list[SurveyStation] = []
         self._movement = Movement(self._stops, self._station_of)
+        self._moved: list[Moved] = []  # of the adjusted hole
+        self._surveyed_back: list[float] = []  # m, in it
         self._adjustment = HoleAdjustment(self._config, self._shared)
         self._examined: tuple[int, ExaminedHole | None] = (0, None)  # of the version that it is of
         self._adjusted: dict[float, Direction] = {}  # by the depth (m) of a station, where the hole is adjusted
         self._alarms = AlarmList()
         self._history = History()
+        self._adjusted_collar: Direction = self._collar
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
-        self._trajectory = Trajectory(collar=self._collar, wander=self._config.wander, keeps_columns=False)
+        self._trajectory = self._drawn_from(self._collar)
         self._deviations = self._deviate()
         self._projection: ProjectedEnd | None = None
         self._is_foreseen = True  # whether the projection is that of the trajectory
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
         self._newest_at = -math.inf  # s, rig time of the newest survey
+
+    def _drawn_from(self, collar: Direction) -> Trajectory:
+        """A trajectory that begins with a direction."""
+        return Trajectory(collar=collar, wander=self._config.wander, keeps_columns=False)
 
     def add_stop(self, stops: ResolvedStops, row: int, epoch: int) -> bool:
         """Take a stop with rig time of an epoch; a revision of one that is known takes its place, unless it is older.
@@ -90,6 +98,8 @@ class SurveyedHole:
         at, md = stops.rows["at"].item(row), stops.rows["md"].item(row)
         if self._history.begins_stop(epoch, at):
             self._history.add(self.deviations, self.projection)
+        if self._is_adjusted:
+            self._adjustment.make_room(stops.rows["chain"].item(row))
         stops.rows["number"][row] = self.newest + 1
         station = self._station_at(md)
         revised = station.stops.revised_by(stops, row)
@@ -130,7 +140,7 @@ class SurveyedHole:
     def moved(self) -> list[Moved]:
         """Where the hole moved."""
         self.settle()
-        return self._movement.moved
+        return self._moved if self._is_adjusted else self._movement.moved
 
     @property
     def alarms(self) -> AlarmList:
@@ -151,13 +161,17 @@ class SurveyedHole:
 
     @property
     def collar(self) -> Direction:
-        """Direction at the collar as well as it is known."""
+        """Direction at the collar as it was told."""
         return self._collar
 
     @property
     def turned_back(self) -> list[float]:
-        """Depths (m) of stations that point back against the one above, in the trajectory as it was drawn last."""
-        return self._trajectory.turned_back
+        """Depths (m) of stations whose surveys point back against those of the one above.
+
+        The adjustment of the hole leaves such a survey out, and what is drawn points on.
+        """
+        self.settle()
+        return self._surveyed_back if self._is_adjusted else self._trajectory.turned_back
 
     def direction_of(self, station: SurveyStation) -> Direction:
         """Direction of the hole at a station, the transport of the string in it."""
@@ -194,7 +208,7 @@ class SurveyedHole:
         """Direction of a station without transport; that of the collar is the collar's where the hole is adjusted."""
         if not self._is_adjusted:
             return station.fused(self._config.weighting)
-        return self._adjusted.get(station.md, self._collar)
+        return self._adjusted.get(station.md, self._adjusted_collar)
 
     @property
     def has_transport(self) -> bool:
@@ -214,12 +228,29 @@ class SurveyedHole:
         They are worked out when they are asked for: a start goes through hundreds of stops and shows none of them.
         """
         drawn = self.trajectory
-        shared = np.concatenate([self._shared.variances(columns) for columns in drawn.columns()])
-        found = dict(zip(KIND_NAMES, np.moveaxis(shared, 1, 0), strict=True))
-        found["depth"] = found["depth"] + np.diagonal(drawn.depth_covs, axis1=1, axis2=2)
-        found["path"] = np.diagonal(drawn.path_covs, axis1=1, axis2=2)
+        found = self._variances_of_directions(drawn)
+        for name, covs in (("depth", drawn.depth_covs), ("path", drawn.path_covs)):
+            found[name] = found.get(name, 0.0) + np.diagonal(covs, axis1=1, axis2=2)
         rest = np.diagonal(drawn.covs, axis1=1, axis2=2) - sum(found.values())
         return {"random": np.maximum(rest, 0.0)} | found
+
+    @property
+    def toe_by_depth(self) -> Array:
+        """Variance (3,), m^2, of the last position by what is not known of depths."""
+        drawn = self.trajectory
+        *_, columns = drawn.columns()
+        shared = self._shared.variances(columns)[-1, KIND_NAMES.index("depth")]
+        return np.asarray(shared + np.diagonal(drawn.depth_covs[-1]))
+
+    def _variances_of_directions(self, drawn: Trajectory) -> dict[str, Array]:
+        """Variances (n, 3), m^2, along a trajectory by what directions have in common."""
+        shared = np.concatenate([self._shared.variances(columns) for columns in drawn.columns()])
+        found = dict(zip(KIND_NAMES, np.moveaxis(shared, 1, 0), strict=True))
+        if not self._is_adjusted or self.examined is None:
+            return found
+        turned = np.square(drawn.positions[:, 1::-1]) * north_std(self._setup) ** 2
+        north = np.concatenate([turned, np.zeros((len(turned), 1))], axis=1)
+        return {"depth": found["depth"], "north": north} | self.examined.position_variances
 
     def place_of(self, station: SurveyStation) -> int:
         """Place of a station in the trajectory; that of the collar for one at its depth."""
@@ -244,11 +275,19 @@ class SurveyedHole:
             self._work_out(self._adjust() if self._is_adjusted else self._fuse(since))
 
     def _adjust(self) -> list[SurveyStation]:
-        """Adjust the hole; all of its stations have changed."""
-        self._touched, examined = {}, self.examined
-        found = [] if examined is None else directions_of(examined.adjusted, self._shared, north_std(self._setup))
-        self._adjusted = dict(zip([one.md for one in self._below], found, strict=True))
-        return self._below
+        """Adjust the hole; all of its stations have changed, and so has the direction from which it is drawn."""
+        self._touched, examined, below = {}, self.examined, self._below
+        if examined is None:
+            return below
+        at_collar, *found = directions_of(examined.adjusted, self._shared, north_std(self._setup))
+        self._adjusted = dict(zip([one.md for one in below], found, strict=True))
+        self._adjusted_collar = at_collar
+        self._trajectory = self._drawn_from(at_collar)
+        self._moved = moved_stations(examined, below)
+        tangents = tangents_of([self._collar, *(one.fused(Weighting.BAYES) for one in below)])
+        back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
+        self._surveyed_back = [below[place].md for place in back.tolist()]
+        return below
 
     def _fuse(self, since: float) -> list[SurveyStation]:
         """Fuse the stations of which something may have changed since a time (s), together those with one more stop."""
@@ -302,7 +341,7 @@ class SurveyedHole:
             return []
         mds, directions = zip(*measured, strict=True)
         places = self._shared.transport_places(len(measured) + 1)
-        self._carried = dict(zip(mds, carry_directions(self._collar, directions, places), strict=True))
+        self._carried = dict(zip(mds, carry_directions(self._adjusted_collar, directions, places), strict=True))
         return [(md, carried.direction) for md, carried in self._carried.items()]
 
     def _deviate(self) -> Deviations:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, Hypothesis, all_hypotheses
+from groundstation.survey.adjustment.hypotheses import BY_DEPTH, KNOWN_SIZE, WIDTHS, Hypothesis, all_hypotheses
 from groundstation.survey.adjustment.looks import Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.scores import Score, log_chances, log_tail, score_hypotheses
@@ -31,6 +31,9 @@ MOST_TRIED = 8
 AS_GOOD = 0.3  # part of the best's logarithm that is worth trying; play hides the rest
 PARTED = math.log(100.0)  # by how much the best outdoes the second, or it is a doubt
 MOST_BLUNDERS = 4
+TUBES_MISCOUNTED = (
+    1.5  # spacings of the stations by which a depth may be off: a tube too many, and what it is off beside
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,11 +180,23 @@ def find_blunder(
         return None
     many = log_of_level(looks, run)
     adjusted = [_tried(looks, string, path, run, found, known, one) for one in worth]
-    tried = [(with_one, _explained(with_one, found, one, many)) for with_one, one in zip(adjusted, worth, strict=True)]
+    tried = [
+        (with_one, _explained(with_one, found, one, many))
+        for with_one, one in zip(adjusted, worth, strict=True)
+        if is_plausible(one, with_one.sizes[-1], run)
+    ]
+    if not tried:
+        return None
     tried.sort(key=lambda pair: pair[1].log_chance)
     with_best, best = tried[0]
     second = tried[1][1] if len(tried) > 1 else None
     return Blunder(best, second, global_ratio(found), global_ratio(with_best.found))
+
+
+def is_plausible(one: Hypothesis, size: Array, run: RunOfStops) -> bool:
+    """Whether a blunder of a size can be: a depth is off by a tube that was not counted, never by half of the hole."""
+    spacing = float(np.max(np.diff(run.station_md), initial=0.0))
+    return one.kind not in BY_DEPTH or abs(float(size[0])) <= TUBES_MISCOUNTED * spacing
 
 
 def chance_of_one(looks: Looks, run: RunOfStops) -> float:
