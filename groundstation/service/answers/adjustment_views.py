@@ -48,6 +48,7 @@ Array = npt.NDArray[np.float64]
 MILLI_G: Final = 1e-3 * STANDARD_GRAVITY  # m/s^2
 DECADE: Final = math.log(10.0)
 LEAST_SHOWN_CM: Final = 1e-4  # of a share
+IN_NO_LOOK: Final = ("north", "depth", "legs")
 STEP: Final = BlunderKind.BIAS_STEPPED
 
 
@@ -74,7 +75,7 @@ def answer_adjustment(k: RigModel, _p: Parameters) -> AdjustmentAnswer:
         left_out=LEFT_OUT,
         unfound=[least_found(examined, one) for one in worst_of_kinds(examined.reliabilities)],
         tubes=[adjusted_tube(examined, place) for place in range(len(examined.tubes))],
-        next_stop=next_stop_advice(examined),
+        next_stop=next_stop_advice(examined, budget),
     )
 
 
@@ -191,11 +192,13 @@ def adjusted_tube(examined: ExaminedHole, place: int) -> AdjustedTube:
     )
 
 
-def next_stop_advice(examined: ExaminedHole) -> NextStopAdvice | None:
-    """Where to stop next; None while one station alone is known."""
+def next_stop_advice(examined: ExaminedHole, budget: Sequence[NamedShare]) -> NextStopAdvice | None:
+    """Where to stop next; None while one station alone is known. What no look tells stays as it is at the toe."""
     planned = examined.next_stop
     if planned is None:
         return None
+    stays = sum(float(one.variances[:LEVEL].sum()) for one in budget if one.source in IN_NO_LOOK)
+    cm = CM * np.sqrt((planned.toe_stds**2 + stays) / LEVEL)
     same = int(np.argmin(np.abs(planned.angles)))
-    numbers = math.degrees(planned.best), CM * float(planned.toe_stds.min()), CM * float(planned.toe_stds[same])
+    numbers = math.degrees(planned.best), float(cm.min()), float(cm[same])
     return NextStopAdvice(*numbers, say_next_stop(*numbers))

@@ -12,7 +12,7 @@ from groundstation.survey.adjustment.reliability import Reliability
 
 CM: Final = 100.0
 NOTHING: Final = "nothing was surveyed below the collar yet"
-LEFT_OUT: Final = "mistakes too small to be found, and whatever turns or moves all tubes alike at every stop"
+LEFT_OUT: Final = "mistakes too small to find, and what turns or moves all tubes alike"
 SOURCES: Final = {  # in the plural, and of one tube
     "force_noise": ("noise of the accelerometers", ""),
     "yaw_noise": ("noise of the yaws", ""),
@@ -65,12 +65,10 @@ def say_next_stop(turn_deg: float, sigma_cm: float, same_face_cm: float) -> str:
     """The angle of the next stop, and what it is worth."""
     gain = same_face_cm - sigma_cm
     if gain < max(WORTH_TURNING_CM, WORTH_TURNING_PART * same_face_cm):
-        return (
-            f"stop at any angle: a turn of the string makes the ± at the toe no smaller ({shown_cm(same_face_cm)} cm)"
-        )
+        return f"any angle: a turn makes the toe no better known (sigma {shown_cm(same_face_cm)} cm)"
     turn, way = (turn_deg, "on") if turn_deg <= math.degrees(math.pi) else (360.0 - turn_deg, "back")
-    known = f"± {shown_cm(sigma_cm)} cm at the toe, not {shown_cm(same_face_cm)} as without a turn"
-    return f"turn the string {way} by {turn:.0f} deg before it: {known}"
+    known = f"sigma at the toe {shown_cm(sigma_cm)} cm, without a turn {shown_cm(same_face_cm)}"
+    return f"turn the string {way} by {turn:.0f} deg: {known}"
 
 
 def shown_cm(cm: float) -> str:

@@ -80,7 +80,7 @@ class NextStopAdvice:
     """Where to stop next: the turn of the string against this stop after which the toe is known best."""
 
     turn_deg: Annotated[float, "by which to turn the string on, against where it stands at the last stop"]
-    sigma_cm: Annotated[float, "standard deviation of the new toe after it"]
+    sigma_cm: Annotated[float, "standard deviation of the new toe after it, to north or east in the mean"]
     same_face_cm: Annotated[float, "the same without a turn"]
     words: Annotated[str, "the same for people"]
 

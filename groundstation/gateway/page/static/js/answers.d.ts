@@ -464,7 +464,7 @@ export interface AdjustedTube {
 export interface NextStopAdvice {
   /** by which to turn the string on, against where it stands at the last stop */
   turn_deg: number;
-  /** standard deviation of the new toe after it */
+  /** standard deviation of the new toe after it, to north or east in the mean */
   sigma_cm: number;
   /** the same without a turn */
   same_face_cm: number;
@@ -702,6 +702,8 @@ export interface SetupRow {
   kind: "north" | "collar" | "joint" | "length" | "stick_up" | "mount" | "mount_turn" | "depth_scale" | "accelerometer" | "gyroscope" | "play" | "path" | "gravity";
   /** tube, or joint as upper and lower tube; empty of what the rig has once */
   subject: string;
+  /** name for people, such as accelerometer of tube 3 */
+  words: string;
   /** one, of the collar inclination and azimuth; empty where it may be any */
   value: number[];
   /** standard deviation of each */
@@ -740,6 +742,8 @@ export interface SetupAnswer {
   todo: string;
   /** item that costs most at the toe, across the hole */
   worst: string;
+  /** the same for people, with what it costs */
+  costs_most: string;
   /** measured depth of the toe */
   at_m: number;
   /** the costs are of the hole as surveyed; before the first station of its design */
