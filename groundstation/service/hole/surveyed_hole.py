@@ -24,7 +24,7 @@ from groundstation.service.hole.movement import Moved, Movement, moved_stations
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
 from groundstation.service.setup.setup_book import SetupBook
-from groundstation.service.setup.setup_priors import collar_direction, north_std
+from groundstation.service.setup.setup_priors import collar_direction, depth_errors, length_stds, north_std
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
@@ -59,7 +59,6 @@ class SurveyedHole:
         self._design = config.design
         self.version = 0  # grows with every survey
         self.newest = 0  # number of the measurement that came last, revisions included
-        self._depth_errors = config.depth_errors
         self.begin_anew()
         self.catch_up()
 
@@ -73,6 +72,7 @@ class SurveyedHole:
         self.version += 1
         self._is_behind = True
         self._collar = collar_direction(self._config, self._setup)
+        self._depth_errors = depth_errors(self._config, self._setup)
         self._stops = ResolvedStops()
         self._station_of: list[SurveyStation] = []  # of each of its rows
         self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
@@ -290,6 +290,14 @@ class SurveyedHole:
         rest = np.diagonal(drawn.covs, axis1=1, axis2=2) - sum(found.values())
         return {"random": np.maximum(rest, 0.0)} | found
 
+    @property
+    def toe_by_depth(self) -> Array:
+        """Variance (3,), m^2, of the last position by what is not known of depths."""
+        drawn = self.trajectory
+        *_, columns = drawn.columns()
+        shared = self._shared.variances(columns)[-1, KIND_NAMES.index("depth")]
+        return np.asarray(shared + np.diagonal(drawn.depth_covs[-1]))
+
     def _variances_of_directions(self, drawn: Trajectory) -> dict[str, Array]:
         """Variances (n, 3), m^2, along a trajectory by what directions have in common."""
         shared = np.concatenate([self._shared.variances(columns) for columns in drawn.columns()])
@@ -361,10 +369,11 @@ class SurveyedHole:
         return changed
 
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
-        depths, places_of = {}, self._stops.depth_places.__getitem__
+        depths, places_of, stds = {}, self._stops.depth_places.__getitem__, length_stds(self._setup)
+        told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()}
         for one in changed:
             places = [*map(places_of, one.stops.rows)]
-            depths[one.md] = mean_depth(one.md, places, self._depth_errors, self._config.tube_length)
+            depths[one.md] = mean_depth(one.md, places, self._depth_errors, self._config.tube_length, told)
         self._trajectory.put(self._directions(changed), depths)
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)

@@ -13,6 +13,7 @@ from groundstation.service.setup.setup_book import SetupBook
 from groundstation.service.setup.setup_items import COLLAR_STD, SetupItem
 from groundstation.service.setup.told_value import SetupKind
 from groundstation.survey.fusion.resolve import Direction, known_direction
+from groundstation.survey.well.depth_errors import DepthErrors
 from telemetry.messages import UNKNOWN_YAW_STD
 
 
@@ -60,6 +61,17 @@ def collar_direction(config: GroundConfig, book: SetupBook) -> Direction:
         return uncertain_direction(config.design.inclination, config.design.azimuth, COLLAR_STD)
     inclination, azimuth = told.values
     return uncertain_direction(inclination, azimuth, told.sigma)
+
+
+def depth_errors(config: GroundConfig, book: SetupBook) -> DepthErrors:
+    """Errors of measured depths but for those of lengths that were told."""
+    told = book.standing(SetupKind.STICK_UP)
+    return config.depth_errors if told is None else replace(config.depth_errors, offset_std=told.sigma)
+
+
+def length_stds(book: SetupBook) -> Mapping[int, float]:
+    """Standard deviations (m) of the lengths that were told, by tube."""
+    return {tube: told.sigma for tube, told in book.lengths.items()}
 
 
 def uncertain_direction(inclination: float, azimuth: float, std: float) -> Direction:

@@ -99,6 +99,11 @@ class Examination:
     suspicion: Blunder | None = None
 
     @property
+    def taken_in(self) -> tuple[Hypothesis, ...]:
+        """What the adjustment has as further unknowns or put right in its looks, in its order."""
+        return _taken_in([*self.blunders, *filter(None, [self.suspicion])])
+
+    @property
     def global_ratio(self) -> float:
         """Weighted squares of what is left over what they are to be: 1 in an honest hole."""
         return global_ratio(self.adjusted)

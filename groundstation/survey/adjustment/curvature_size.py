@@ -27,7 +27,7 @@ LEAST = 1e-12  # rad^2/m^2
 
 
 def learnt_curvature(found: Adjusted) -> tuple[float, Array]:
-    """Variance (rad^2/m^2) of the curvature of the hole, and that by which each leg (s,) is driven: a step of iteration.
+    """Variance (rad^2/m^2) of the hole's curvature, and that by which each leg (s,) is driven: a step of iteration.
 
     The departures of the legs are weighed as they stand, so the two settle together.
     """

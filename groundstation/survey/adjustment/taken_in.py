@@ -87,9 +87,14 @@ def adjust_with(
             break
         now = replace(found.now, extra=np.zeros(0))
         turned = _turned_back(looks, run, sought, sizes)
-    shown = iter(_places(sought))
-    slices = [slice(0, 0) if one.kind in KNOWN_SIZE else next(shown) for one in blunders]
+    slices = places_among_further(blunders)
     return TakenIn(found, tuple(sizes[one] for one in slices), tuple(cov[one, one] for one in slices))
+
+
+def places_among_further(blunders: Sequence[Hypothesis]) -> list[slice]:
+    """Where each blunder stands among the further unknowns; empty of one whose size is known."""
+    shown = iter(_places([one for one in blunders if one.kind not in KNOWN_SIZE]))
+    return [slice(0, 0) if one.kind in KNOWN_SIZE else next(shown) for one in blunders]
 
 
 def _is_of(sought: Sequence[Hypothesis], kinds: Sequence[BlunderKind]) -> npt.NDArray[np.bool_]:
