@@ -20,7 +20,7 @@ from groundstation.service.hole.resolved_stops import ResolvedStops, Rows
 from groundstation.service.hole.string_prior import Hanging, causes_of_turns, prior_of_string
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.blunders import examine_hole
+from groundstation.survey.adjustment.blunders import Examination, examine_hole
 from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.fusion.resolve import Direction
@@ -167,6 +167,15 @@ def noise_of(seen: Rows, tube_of: Places) -> Array:
     counts = np.bincount(tube_of)
     usual = (np.bincount(tube_of, own) / np.maximum(counts, 1))[tube_of]
     return np.where(own > LOUD * usual, own, OWN_SHARE * own + (1.0 - OWN_SHARE) * usual)
+
+
+def collar_of(examination: Examination, told: Direction) -> Direction:
+    """Direction at the collar: as it was told, or as the stations have it where that is doubted."""
+    if not examination.doubts_collar:
+        return told
+    found = examination.adjusted
+    tangent, level = found.now.tangents[0], found.bases[0, :, :2]
+    return replace(told, lean=tangent[:2], down=float(tangent[2]), cov=level.T @ found.covs[0, :2, :2] @ level)
 
 
 def directions_of(adjusted: Adjusted, shared: SharedErrors, north_std: float) -> list[SphereDirection]:

@@ -10,6 +10,7 @@ import itertools
 import math
 from bisect import bisect_left, insort
 from collections.abc import Sequence
+from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
@@ -19,10 +20,11 @@ from groundstation.config import GroundConfig
 from groundstation.service.hole.deviation_alarms import AlarmList
 from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import History
-from groundstation.service.hole.hole_adjustment import HoleAdjustment, directions_of
+from groundstation.service.hole.hole_adjustment import HoleAdjustment, collar_of, directions_of
 from groundstation.service.hole.movement import Moved, Movement
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
+from groundstation.service.hole.told_depths import depths_at_make_ups, told_depth_errors
 from groundstation.service.setup.setup_book import SetupBook
 from groundstation.service.setup.setup_priors import collar_direction, north_std
 from groundstation.survey.fusion.fusion import Weighting
@@ -33,7 +35,8 @@ from groundstation.survey.fusion.transport import Carried, carry_directions
 from groundstation.survey.path.curvature_tendency import CurvatureTendency, learn_curvature
 from groundstation.survey.wall.column_deviation import Deviations, axis_deviations
 from groundstation.survey.wall.projected_end import ProjectedEnd, project_to_target
-from groundstation.survey.well.depth_errors import mean_depth
+from groundstation.survey.well.depth_errors import DepthErrors, mean_depth
+from groundstation.survey.well.make_up_depths import learnt_reading_std, misfit_of_depths
 from groundstation.survey.well.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
@@ -57,13 +60,14 @@ class SurveyedHole:
         self._design = config.design
         self.version = 0  # grows with every survey
         self.newest = 0  # number of the measurement that came last, revisions included
-        self._depth_errors = config.depth_errors
         self.begin_anew()
 
     def begin_anew(self) -> None:
         """Forget every stop; they are added again, as they are by what was told of the rig since."""
         self.version += 1
         self._collar = collar_direction(self._config, self._setup)
+        self._depth_errors = told_depth_errors(self._config, self._setup)
+        self._misfit: tuple[int, float, str] = (0, 0.0, "")  # of depths, by version and since when
         self._stops = ResolvedStops()
         self._station_of: list[SurveyStation] = []  # of each of its rows
         self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
@@ -75,7 +79,7 @@ class SurveyedHole:
         self._alarms = AlarmList()
         self._history = History()
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
-        self._trajectory = Trajectory(collar=self._collar, wander=self._config.wander, keeps_columns=False)
+        self._draw_from(self._collar)
         self._deviations = self._deviate()
         self._projection: ProjectedEnd | None = None
         self._is_foreseen = True  # whether the projection is that of the trajectory
@@ -243,9 +247,17 @@ class SurveyedHole:
         if since < math.inf:
             self._work_out(self._adjust() if self._is_adjusted else self._fuse(since))
 
+    def _draw_from(self, collar: Direction) -> None:
+        """Begin the trajectory anew with a direction at the collar."""
+        self._trajectory_from = collar
+        self._trajectory = Trajectory(collar=collar, wander=self._config.wander, keeps_columns=False)
+
     def _adjust(self) -> list[SurveyStation]:
         """Adjust the hole; all of its stations have changed."""
         self._touched, examined = {}, self.examined
+        collar = self._collar if examined is None else collar_of(examined.examination, self._collar)
+        if collar is not self._trajectory_from:
+            self._draw_from(collar)
         found = [] if examined is None else directions_of(examined.adjusted, self._shared, north_std(self._setup))
         self._adjusted = dict(zip([one.md for one in self._below], found, strict=True))
         return self._below
@@ -260,11 +272,27 @@ class SurveyedHole:
             SurveyStation.add_newest(grown, newest)
         return changed
 
+    def depth_misfit(self, since: float) -> str:
+        """Why the depths of surveys after a rig time (s) do not fit the tubes, in words, or nothing."""
+        if self._misfit[:2] != (self.version, since):
+            found = depths_at_make_ups(self._stops, self._shared, self._config, self._setup, since)
+            what = misfit_of_depths(found, self._depth_errors, self._config.tube_length)
+            self._misfit = self.version, since, what
+        return self._misfit[2]
+
+    def _errors_of_depths(self) -> DepthErrors:
+        """Errors of measured depths; where the whole hole is worked out anew, as far as they scatter at make-ups."""
+        if not self._is_adjusted:
+            return self._depth_errors
+        found = depths_at_make_ups(self._stops, self._shared, self._config, self._setup)
+        std = learnt_reading_std(found, self._depth_errors, self._config.tube_length)
+        return replace(self._depth_errors, reading_std=std)
+
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
-        depths, places_of = {}, self._stops.depth_places.__getitem__
+        depths, places_of, errors = {}, self._stops.depth_places.__getitem__, self._errors_of_depths()
         for one in changed:
             places = [*map(places_of, one.stops.rows)]
-            depths[one.md] = mean_depth(one.md, places, self._depth_errors, self._config.tube_length)
+            depths[one.md] = mean_depth(one.md, places, errors, self._config.tube_length)
         self._trajectory.put(self._directions(changed), depths)
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)

@@ -9,7 +9,7 @@ procedure for use in multi sensor integration", ION GPS (1990): detection, ident
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjust import adjust_hole, linearise_all
 from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.collar import untold_collar
 from groundstation.survey.adjustment.equations import path_equations, string_departure
 from groundstation.survey.adjustment.hypotheses import (
     BY_DEPTH,
@@ -36,7 +37,7 @@ from groundstation.survey.adjustment.kernels.path_elimination import eliminate_p
 from groundstation.survey.adjustment.looks import FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.play import PLAY_KNOWN_AS
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
-from groundstation.survey.adjustment.sphere import carried_bases
+from groundstation.survey.adjustment.sphere import bends_between, carried_bases
 from groundstation.survey.adjustment.starting_point import first_start
 
 Array = npt.NDArray[np.float64]
@@ -71,7 +72,9 @@ def adjust_with(
 ) -> TakenIn:
     """Adjust a hole with blunders taken in; without any it is ``adjust_hole``."""
     looks = put_right(looks, blunders)
-    sought = [one for one in blunders if one.kind not in KNOWN_SIZE]
+    told, sought = path, [one for one in blunders if one.kind not in (*KNOWN_SIZE, BlunderKind.COLLAR_WRONG)]
+    if len(sought) < len(blunders) and any(one.kind is BlunderKind.COLLAR_WRONG for one in blunders):
+        path = untold_collar(path)
     now = replace(start or first_start(looks, string, path), extra=np.zeros(0))
     is_turn, is_bent = (_is_of(sought, kinds) for kinds in (BY_TURN, BENT))
     sizes, turned = np.zeros(len(is_turn)), looks
@@ -87,8 +90,25 @@ def adjust_with(
         now = replace(found.now, extra=np.zeros(0))
         turned = _turned_back(looks, run, sought, sizes)
     shown = iter(_places(sought))
-    slices = [slice(0, 0) if one.kind in KNOWN_SIZE else next(shown) for one in blunders]
-    return TakenIn(found, tuple(sizes[one] for one in slices), tuple(cov[one, one] for one in slices))
+    slices = {one: next(shown) for one in sought}
+    shares = [_share_of(one, slices, sizes, cov, found, told) for one in blunders]
+    return TakenIn(found, tuple(size for size, _ in shares), tuple(share for _, share in shares))
+
+
+def _share_of(
+    one: Hypothesis,
+    slices: Mapping[Hypothesis, slice],
+    sizes: Array,
+    cov: Array,
+    found: Adjusted,
+    told: PathPrior,
+) -> tuple[Array, Array]:
+    """Size and covariance of one blunder; empty where the size is known."""
+    if one.kind is BlunderKind.COLLAR_WRONG:
+        ends = np.stack([found.now.tangents[0], told.collar])
+        return bends_between(ends, found.bases[:1].repeat(2, axis=0))[0], found.covs[0, :2, :2]
+    at = slices.get(one, slice(0, 0))
+    return sizes[at], cov[at, at]
 
 
 def _is_of(sought: Sequence[Hypothesis], kinds: Sequence[BlunderKind]) -> npt.NDArray[np.bool_]:
