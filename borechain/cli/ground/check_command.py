@@ -87,7 +87,7 @@ def check(request: CheckRequest, as_json: bool) -> None:
 
 
 def check_text(found: SetupCheck) -> str:
-    """The answer for people: the word, what is missing, what is wrong, what costs most, what to do next, and what no sigma holds."""
+    """The answer for people: the word, what is missing, wrong, or costs most, what to do next, what no sigma holds."""
     lines = ["READY TO DRILL" if found.ready else "NOT READY TO DRILL"]
     lines += [f"missing  {name}" for name in found.missing]
     lines += [f"wrong    {why}" for why in found.wrong]

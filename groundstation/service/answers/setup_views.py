@@ -18,8 +18,8 @@ from groundstation.service.setup.toe_costs import designed_course
 
 SHOWN_UNITS = {"rad": "deg", "rad/s": "deg/s", "rad/m": "deg/m"}  # what people read in place of a unit
 LEFT_OUT = (
-    "random noise of the readings, and blunders that are not found. A slip in telling north, the stick-up or the length "
-    "of a tube is in no reading: take a second bearing, set the bit at the collar's edge, tape the tubes"
+    "random noise of the readings, and blunders that are not found. A slip in telling north, the stick-up or a "
+    "length is in no reading: take a second bearing, set the bit at the collar's edge, tape the tubes"
 )
 
 

@@ -1,8 +1,8 @@
 """A quick look whether anything is wrong with a hole at all, so that a hole that fits costs nearly nothing.
 
 Each look alone, each tube from each stop on, each chain of tubes below a joint from each stop on, and each tube and
-the collar against what was known of them before. In a hole of many stops only the latest, which no earlier screen has seen, and each
-tube for itself. Source: Baarda's data snooping, by sums from the end.
+the collar against what was known of them before. In a hole of many stops only the latest, which no earlier screen has
+seen, and each tube for itself. Source: Baarda's data snooping, by sums from the end.
 """
 
 from __future__ import annotations

@@ -138,4 +138,5 @@ def _too_deep(found: MakeUpDepths, errors: DepthErrors) -> str:
     if over[worst] <= 0.0:
         return ""
     bit, tubes, reach = float(found.bit[worst]), int(found.tubes[worst]), float(found.reach[worst])
-    return f"the bit was at {bit:.2f} m with {tubes} tube{'s' if tubes > 1 else ''} of {reach:.2f} m: stick-up, depth or lengths are wrong"
+    string = f"{tubes} tube{'s' if tubes > 1 else ''} of {reach:.2f} m"
+    return f"the bit was at {bit:.2f} m with {string}: stick-up, depth or lengths are wrong"
