@@ -146,7 +146,11 @@ def grown_start(start: StartingPoint, used: Places, count: int, string: StringPr
     nearest = np.searchsorted(known, np.arange(count), side="right") - 1
     curvatures = np.zeros((count, 2))
     curvatures[known] = start.curvatures
-    return replace(start, tangents=start.tangents[nearest], curvatures=curvatures, tubes=tubes, make_ups=make_ups)
+    legs = np.full(count - 1, start.curvature_var)
+    legs[known[1:] - 1] = start.leg_vars
+    return replace(
+        start, tangents=start.tangents[nearest], curvatures=curvatures, tubes=tubes, make_ups=make_ups, leg_vars=legs
+    )
 
 
 def number_values(values: npt.NDArray[np.uint32]) -> tuple[list[int], Places]:

@@ -2,7 +2,8 @@
 
 The unknowns are the direction and the curvature of the hole at collar and stations, and for each tube the bias of its
 accelerometer, the tilt of its mount and the turn of its chain; gravity, and what blunders were found. All have priors.
-How far a tube lies askew in the hole at each stop (play and bend) is learnt from what the looks leave.
+How far a tube lies askew in the hole at each stop (play and bend) is learnt from what the looks leave, and so is how
+sharply the hole bends.
 Source: Gauss-Newton; variance components after Foerstner, "Ein Verfahren zur Schaetzung von Varianz- und
 Kovarianzkomponenten", AVN 86 (1979).
 """
@@ -15,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted, Linearised, LinearSolution
+from groundstation.survey.adjustment.curvature_size import learnt_curvature
 from groundstation.survey.adjustment.equations import (
     Equations,
     path_equations,
@@ -32,6 +34,7 @@ Array = npt.NDArray[np.float64]
 ITERATIONS = 12
 SETTLED = 1e-3  # standard deviations, of the last step
 PLAY_SETTLED = 0.02  # of its variance
+LEGS_SETTLED = 0.1  # of the variance of each leg
 GROSS = 16.27  # chi-square of three beyond which a look counts less: one in a thousand
 
 
@@ -70,9 +73,11 @@ def adjust_hole(
         now = _stepped(now, bases, solution)
         found = Adjusted(looks, string, path, extra, now, linear, solution, known)
         play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)
-        if solution.step < SETTLED and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var:
+        whole, legs = learnt_curvature(found)
+        is_bent = bool(np.all(np.abs(legs - now.leg_vars) <= LEGS_SETTLED * now.leg_vars))
+        if solution.step < SETTLED and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var and is_bent:
             break
-        now = replace(now, play_var=play)
+        now = replace(now, play_var=play, curvature_var=whole, leg_vars=legs)
     return found
 
 
@@ -151,5 +156,7 @@ def _stepped(now: StartingPoint, bases: Array, solution: LinearSolution) -> Star
         now.make_ups + solution.common[make_ups],
         now.gravity + float(solution.common[size]),
         now.play_var,
+        now.curvature_var,
+        now.leg_vars,
         now.extra + solution.common[make_ups.stop :],
     )
