@@ -23,6 +23,10 @@ LEVEL = 2  # of north, east and down those across a hole
 OF_TUBE = (ShareSource.BIAS, ShareSource.TILT)
 LARGEST_STEP = 0.2  # m/s^2, by which an accelerometer that was knocked may step: 20 mg
 STEP = BlunderKind.BIAS_STEPPED
+UNSOLVED = (
+    "the surveys cannot be adjusted to each other, so every station stands for itself and nothing is found that is "
+    "wrong: check what was told of the rig, and the newest surveys"
+)
 
 
 @dataclass(frozen=True)  # with a dictionary, for what is worked out once

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, insort
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from operator import attrgetter
 
@@ -19,7 +19,7 @@ import numpy.typing as npt
 from groundstation.config import GroundConfig
 from groundstation.service.hole.deviation_alarms import AlarmList
 from groundstation.service.hole.examined_hole import ExaminedHole
-from groundstation.service.hole.history import History
+from groundstation.service.hole.history import History, Moment
 from groundstation.service.hole.hole_adjustment import HoleAdjustment, collar_of, directions_of
 from groundstation.service.hole.movement import Moved, Movement
 from groundstation.service.hole.resolved_stops import ResolvedStops
@@ -61,10 +61,17 @@ class SurveyedHole:
         self.version = 0  # grows with every survey
         self.newest = 0  # number of the measurement that came last, revisions included
         self.begin_anew()
+        self.catch_up()
 
-    def begin_anew(self) -> None:
-        """Forget every stop; they are added again, as they are by what was told of the rig since."""
+    def begin_anew(self, kept: Iterable[Moment] = ()) -> None:
+        """Forget every stop; they are added again, as they are by what was told of the rig since, until caught up.
+
+        Parameters
+        ----------
+        kept : what was known at the end of stops, where it is to be had
+        """
         self.version += 1
+        self._is_behind = True
         self._collar = collar_direction(self._config, self._setup)
         self._depth_errors = told_depth_errors(self._config, self._setup)
         self._misfit: tuple[int, float, str] = (0, 0.0, "")  # of depths, by version and since when
@@ -75,9 +82,10 @@ class SurveyedHole:
         self._movement = Movement(self._stops, self._station_of)
         self._adjustment = HoleAdjustment(self._config, self._shared)
         self._examined: tuple[int, ExaminedHole | None] = (0, None)  # of the version that it is of
+        self._is_unsolved = False
         self._adjusted: dict[float, Direction] = {}  # by the depth (m) of a station, where the hole is adjusted
         self._alarms = AlarmList()
-        self._history = History()
+        self._history = History(kept)
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
         self._draw_from(self._collar)
         self._deviations = self._deviate()
@@ -93,7 +101,7 @@ class SurveyedHole:
         """
         at, md = stops.rows["at"].item(row), stops.rows["md"].item(row)
         if self._history.begins_stop(epoch, at):
-            self._history.add(self.deviations, self.projection)
+            self._end_stop()
         stops.rows["number"][row] = self.newest + 1
         station = self._station_at(md)
         revised = station.stops.revised_by(stops, row)
@@ -109,6 +117,25 @@ class SurveyedHole:
         self._unsettled_since = min(self._unsettled_since, at)
         self._newest_at = max(self._newest_at, at)
         return True
+
+    def catch_up(self) -> None:
+        """Every stop that was known has been added; what was known at the end of each later one is worked out."""
+        self._is_behind = False
+
+    def _end_stop(self) -> None:
+        """Keep what is known at the end of a stop. What is kept of one already is judged as it was judged then."""
+        history = self._history
+        if not (self._is_adjusted and self._is_behind):
+            history.add(self.deviations, self.projection)
+        elif (kept := history.take_over()) is not None:
+            if len(kept.where) > 1:
+                self._alarms.judge_deviation(kept.worst(first=1), kept.at)
+            if (end := kept.projection) is not None:
+                self._alarms.judge_projection(end, kept.at)
+        elif history.is_worth(len(self._stops)):
+            history.add(self.deviations, self.projection)
+        else:
+            history.pass_over()
 
     def has_untrusted(self, tube: int) -> bool:
         """Whether the yaw of any measurement of a tube is not believed."""
@@ -176,7 +203,7 @@ class SurveyedHole:
 
     @property
     def examined(self) -> ExaminedHole | None:
-        """The hole adjusted in one, and what is wrong with it; None before the first look at a station.
+        """The hole adjusted in one, and what is wrong with it; None before the first look at a station, or unsolved.
 
         Where the stations are fused one by one it stands beside them, and is worked out when it is asked for.
         """
@@ -185,9 +212,18 @@ class SurveyedHole:
             place = {id(one): number for number, one in enumerate(below, 1)}
             station_of_row = np.array([place.get(id(one), 0) for one in self._station_of], np.intp)
             mds = np.array([one.md for one in below])
-            found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar)
+            try:
+                found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar)
+                self._is_unsolved = False
+            except (np.linalg.LinAlgError, ArithmeticError):
+                found, self._is_unsolved = None, True
             self._examined = self.version, found
         return self._examined[1]
+
+    @property
+    def is_unsolved(self) -> bool:
+        """Whether its surveys have no solution in common, so that each station stands for itself."""
+        return self.examined is None and self._is_unsolved
 
     @property
     def _below(self) -> list[SurveyStation]:
@@ -255,10 +291,13 @@ class SurveyedHole:
     def _adjust(self) -> list[SurveyStation]:
         """Adjust the hole; all of its stations have changed."""
         self._touched, examined = {}, self.examined
-        collar = self._collar if examined is None else collar_of(examined.examination, self._collar)
+        if examined is None:
+            self._adjusted = {one.md: one.fused(Weighting.BAYES) for one in self._below}
+            return self._below
+        collar = collar_of(examined.examination, self._collar)
         if collar is not self._trajectory_from:
             self._draw_from(collar)
-        found = [] if examined is None else directions_of(examined.adjusted, self._shared, north_std(self._setup))
+        found = directions_of(examined.adjusted, self._shared, north_std(self._setup))
         self._adjusted = dict(zip([one.md for one in self._below], found, strict=True))
         return self._below
 

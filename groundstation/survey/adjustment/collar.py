@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.equations import KNOWN
+from groundstation.survey.adjustment.equations import KNOWN, STATE, leg_steps
 from groundstation.survey.adjustment.looks import PathPrior
-from groundstation.survey.adjustment.scores import UNTOLD, best_sizes
+from groundstation.survey.adjustment.scores import best_sizes
 from groundstation.survey.adjustment.sphere import bends_between
 
 Array = npt.NDArray[np.float64]
@@ -36,16 +36,26 @@ class CollarDeparture:
 
 
 def collar_departure(found: Adjusted) -> CollarDeparture:
-    """Departure of the collar as it was told, in the axes of the collar of an adjustment."""
-    bases = found.bases[0]
-    ends = np.stack([found.now.tangents[0], found.path.collar])
-    off = bends_between(ends, bases[None].repeat(2, axis=0))[0] - found.solution.states[0, :2]
-    known = np.linalg.inv(bases @ found.path.collar_cov @ bases.T + KNOWN * np.eye(2))
-    free = known - known @ found.covs[0, :2, :2] @ known
-    sizes, _, told, squares = best_sizes((known @ off)[None], known[None], free[None])
-    size = float(np.trace(known))
-    cov = np.linalg.pinv(free, rcond=UNTOLD * size / max(float(np.trace(free)), 1e-300))
-    return CollarDeparture(sizes[0], np.asarray(cov, np.float64), float(squares[0]), int(told[0]))
+    """Departure of the collar as it was told, in the axes of the collar of an adjustment.
+
+    What the first station says, direction and curvature, is compared with what the collar leads to down a leg that bends
+    as the hole does on the whole: were the leg taken to bend as sharply as it seems to, no collar would ever be wrong.
+    """
+    bases, now = found.bases, found.now
+    if len(now.tangents) < 2:
+        return CollarDeparture(np.zeros(2), np.eye(2), 0.0, 0)
+    go, rigid = leg_steps(found.path)
+    at_collar = np.zeros((STATE, STATE))
+    at_collar[:2, :2] = bases[0] @ found.path.collar_cov @ bases[0].T + KNOWN * np.eye(2)
+    at_collar[2:, 2:] = now.curvature_var * np.eye(2)
+    cov = go[0] @ at_collar @ go[0].T + now.curvature_var * np.linalg.inv(rigid[0]) + found.covs[1]
+    ends = np.stack([found.path.collar, now.tangents[1]])
+    bent = bends_between(ends, bases[:1].repeat(2, axis=0))[0]
+    seen = np.concatenate([bent, now.curvatures[1]]) + found.solution.states[1]
+    weighed = np.asarray(np.linalg.solve(cov, go[0][:, :2]), np.float64)
+    free = go[0][:, :2].T @ weighed
+    sizes, _, told, squares = best_sizes(-(weighed.T @ seen)[None], free[None], free[None])
+    return CollarDeparture(sizes[0], np.asarray(np.linalg.inv(free), np.float64), float(squares[0]), int(told[0]))
 
 
 def untold_collar(path: PathPrior) -> PathPrior:
