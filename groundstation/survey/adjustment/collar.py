@@ -38,8 +38,8 @@ class CollarDeparture:
 def collar_departure(found: Adjusted) -> CollarDeparture:
     """Departure of the collar as it was told, in the axes of the collar of an adjustment.
 
-    What the first station says, direction and curvature, is compared with what the collar leads to down a leg that bends
-    as the hole does on the whole: were the leg taken to bend as sharply as it seems to, no collar would ever be wrong.
+    What the first station says, direction and curvature, is compared with what the collar leads to down a leg that
+    bends as the hole does on the whole: were the leg taken to bend as sharply as it seems to, no collar would ever be wrong.
     """
     bases, now = found.bases, found.now
     if len(now.tangents) < 2:
@@ -51,7 +51,7 @@ def collar_departure(found: Adjusted) -> CollarDeparture:
     cov = go[0] @ at_collar @ go[0].T + now.curvature_var * np.linalg.inv(rigid[0]) + found.covs[1]
     ends = np.stack([found.path.collar, now.tangents[1]])
     bent = bends_between(ends, bases[:1].repeat(2, axis=0))[0]
-    seen = np.concatenate([bent, now.curvatures[1]]) + found.solution.states[1]
+    seen = np.concatenate([bent, now.curvatures[1]])
     weighed = np.asarray(np.linalg.solve(cov, go[0][:, :2]), np.float64)
     free = go[0][:, :2].T @ weighed
     sizes, _, told, squares = best_sizes(-(weighed.T @ seen)[None], free[None], free[None])
