@@ -191,7 +191,7 @@ def _score_of_collar(found: Adjusted, known: tuple[Hypothesis, ...]) -> list[Sco
     if COLLAR in known:
         return []
     off = collar_departure(found)
-    free = np.linalg.pinv(off.cov)[None]
+    free = np.asarray(np.linalg.pinv(off.cov), np.float64)[None]
     return [Score((COLLAR,), off.size[None], free, np.array([off.told], np.intp), np.array([off.squares]))]
 
 
