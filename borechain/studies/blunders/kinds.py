@@ -19,6 +19,7 @@ from groundstation.survey.adjustment.hypotheses import BlunderKind
 from sim.studies.scenarios import Tables
 
 MIDDLE_S: Final = 640.0  # after the start
+LAST_S: Final = 1070.0  # likewise, while the last tube is drilled in
 TUBE: Final = 4  # that something happens to; it is in the string at that time, and not at the bit
 Change = Callable[[Tables, float], Tables]
 
@@ -118,7 +119,8 @@ KINDS: Final[tuple[PlantedBlunder, ...]] = (
     ),
     PlantedBlunder(
         "accelerometer of the bit steps at the last stop", "mg", (0.3, 3.0, 30.0),
-        of_disturbance("force-step", lambda mg: {"tube": 1, "after_s": 1450.0, "step_mg": (mg, mg, 0.0)}), BIAS,
+        of_disturbance("force-step", lambda mg: {"tube": 1, "after_s": LAST_S, "step_mg": (mg, mg, 0.0)}), BIAS,
+        seen_by="the next stop",
     ),
     PlantedBlunder(
         "accelerometer creeps", "mg/s", (0.001, 0.01, 0.3),
