@@ -33,6 +33,7 @@ from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
 from groundstation.survey.fusion.survey_trust import Trust
 from groundstation.survey.fusion.transport import Carried, carry_directions
 from groundstation.survey.path.curvature_tendency import CurvatureTendency, learn_curvature
+from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.wall.column_deviation import Deviations, axis_deviations
 from groundstation.survey.wall.projected_end import ProjectedEnd, project_to_target
 from groundstation.survey.well.depth_errors import DepthErrors, mean_depth
@@ -299,6 +300,12 @@ class SurveyedHole:
             self._draw_from(collar)
         found = directions_of(examined.adjusted, self._shared, north_std(self._setup))
         self._adjusted = dict(zip([one.md for one in self._below], found, strict=True))
+        if examined is not None:
+            now = examined.adjusted.now
+            wander = LegWander(math.sqrt(now.curvature_var), self._config.curvature_length)
+            driven = now.leg_vars / now.curvature_var
+            driven[:-1] = np.maximum(driven[:-1], driven[1:])  # what bends sharply may have begun above the station
+            self._trajectory.bend_as(wander, driven)
         return self._below
 
     def _fuse(self, since: float) -> list[SurveyStation]:

@@ -99,7 +99,7 @@ def test_the_likelihood_is_that_of_dense_matrices(honest: DrawnString) -> None:
     squares += off[dense.states :] @ dense.prior[dense.states :, dense.states :] @ off[dense.states :]
     across = found.linear.bases
     collar = across[0] @ (now.tangents[0] - honest.path.collar)
-    squares += collar @ collar / (0.5 * DEG) ** 2 + np.sum(now.curvatures[0] ** 2) / (0.15 * DEG) ** 2
+    squares += collar @ collar / (0.5 * DEG) ** 2 + np.sum(now.curvatures[0] ** 2) / now.curvature_var
     for k in range(10):
         go, spread = walk(2.0, 20.0, now.leg_vars[k] ** 0.5)
         bend = across[k] @ (now.tangents[k + 1] - now.tangents[k])
