@@ -4,9 +4,9 @@ A tube that lies along the unit vector d and is turned by psi about it reads, at
 
     f = g (m + t x m + t x (t x m) / 2) + b,    m = (R(-psi) (d_N, d_E), -d_D),    t = (tilt, 0),
 
-(a mount is half a degree off: to first order alone its tilt would make the force longer by what a bias may be) and its
-yaw is psi plus the turn of its chain plus an error of its own, which is estimated look by look: a yaw that is hardly
-known puts the lean on a circle, not on a straight line. What is left is linear.
+and its yaw is psi plus the turn of its chain plus an error of its own, which is estimated look by look: a yaw that is
+hardly known puts the lean on a circle, not on a straight line. What is left is linear. A tilt is taken to second order,
+for a mount is half a degree off: to first order it would make the force longer by what a bias may be.
 Source: thesis eqs. 1.1-1.3; Gauss and Newton's method.
 """
 
