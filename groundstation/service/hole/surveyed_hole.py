@@ -10,6 +10,7 @@ import itertools
 import math
 from bisect import bisect_left, insort
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
@@ -23,8 +24,10 @@ from groundstation.service.hole.hole_adjustment import HoleAdjustment, direction
 from groundstation.service.hole.movement import Moved, Movement, moved_stations
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
+from groundstation.service.hole.told_depths import depths_at_make_ups
 from groundstation.service.setup.setup_book import SetupBook
-from groundstation.service.setup.setup_priors import collar_direction, north_std
+from groundstation.service.setup.setup_priors import collar_direction, depth_errors, length_stds, north_std
+from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
@@ -35,7 +38,8 @@ from groundstation.survey.path.curvature_tendency import CurvatureTendency, lear
 from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.wall.column_deviation import Deviations, axis_deviations
 from groundstation.survey.wall.projected_end import ProjectedEnd, project_to_target
-from groundstation.survey.well.depth_errors import mean_depth
+from groundstation.survey.well.depth_errors import DepthErrors, mean_depth
+from groundstation.survey.well.make_up_depths import learnt_reading_std, misfit_of_depths
 from groundstation.survey.well.trajectory import TURNED_BACK, Trajectory
 
 Array = npt.NDArray[np.float64]
@@ -60,7 +64,6 @@ class SurveyedHole:
         self._design = config.design
         self.version = 0  # grows with every survey
         self.newest = 0  # number of the measurement that came last, revisions included
-        self._depth_errors = config.depth_errors
         self.begin_anew()
         self.catch_up()
 
@@ -74,6 +77,8 @@ class SurveyedHole:
         self.version += 1
         self._is_behind = True
         self._collar = collar_direction(self._config, self._setup)
+        self._depth_errors = depth_errors(self._config, self._setup)
+        self._misfit: tuple[int, float, str] = (0, 0.0, "")  # of depths, by version and since when
         self._stops = ResolvedStops()
         self._station_of: list[SurveyStation] = []  # of each of its rows
         self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
@@ -291,6 +296,14 @@ class SurveyedHole:
         rest = np.diagonal(drawn.covs, axis1=1, axis2=2) - sum(found.values())
         return {"random": np.maximum(rest, 0.0)} | found
 
+    @property
+    def toe_by_depth(self) -> Array:
+        """Variance (3,), m^2, of the last position by what is not known of depths."""
+        drawn = self.trajectory
+        *_, columns = drawn.columns()
+        shared = self._shared.variances(columns)[-1, KIND_NAMES.index("depth")]
+        return np.asarray(shared + np.diagonal(drawn.depth_covs[-1]))
+
     def _variances_of_directions(self, drawn: Trajectory) -> dict[str, Array]:
         """Variances (n, 3), m^2, along a trajectory by what directions have in common."""
         shared = np.concatenate([self._shared.variances(columns) for columns in drawn.columns()])
@@ -326,6 +339,8 @@ class SurveyedHole:
     def _adjust(self) -> list[SurveyStation]:
         """Adjust the hole; all of its stations have changed, and so has the direction from which it is drawn."""
         self._touched, examined, below = {}, self.examined, self._below
+        for station in self._stations:
+            station.forget_view()
         if examined is None:
             self._stand_alone(below)
             return below
@@ -333,10 +348,7 @@ class SurveyedHole:
         self._adjusted = dict(zip([one.md for one in below], found, strict=True))
         self._adjusted_collar = at_collar
         self._trajectory = self._drawn_from(at_collar)
-        now = examined.adjusted.now
-        driven = now.leg_vars / now.curvature_var
-        driven[:-1] = np.maximum(driven[:-1], driven[1:])  # what bends sharply may have begun above the station
-        self._trajectory.bend_as(LegWander(math.sqrt(now.curvature_var), self._config.curvature_length), driven)
+        self._bend_as(examined.adjusted)
         self._moved = moved_stations(examined, below)
         self._surveyed_back = self._points_back(below)
         return below
@@ -353,6 +365,13 @@ class SurveyedHole:
         back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
         return [below[place].md for place in back.tolist()]
 
+    def _bend_as(self, found: Adjusted) -> None:
+        """Have what lies between stations follow the curvature that the adjustment has learnt."""
+        wander = LegWander(math.sqrt(found.now.curvature_var), self._config.curvature_length)
+        driven = found.now.leg_vars / found.now.curvature_var
+        driven[:-1] = np.maximum(driven[:-1], driven[1:])  # what bends sharply may have begun above the station
+        self._trajectory.bend_as(wander, driven)
+
     def _fuse(self, since: float) -> list[SurveyStation]:
         """Fuse the stations of which something may have changed since a time (s), together those with one more stop."""
         by_depth = self._touched | self._movement.judge_since(since)
@@ -363,11 +382,29 @@ class SurveyedHole:
             SurveyStation.add_newest(grown, newest)
         return changed
 
+    def depth_misfit(self, since: float) -> str:
+        """Why the depths of surveys after a rig time (s) do not fit the tubes, in words, or nothing."""
+        if self._misfit[:2] != (self.version, since):
+            found = depths_at_make_ups(self._stops, self._shared, self._config, self._setup, since)
+            what = misfit_of_depths(found, self._depth_errors, self._config.tube_length)
+            self._misfit = self.version, since, what
+        return self._misfit[2]
+
+    def _errors_of_depths(self) -> DepthErrors:
+        """Errors of measured depths; where the whole hole is worked out anew, as far as they scatter at make-ups."""
+        if not self._is_adjusted:
+            return self._depth_errors
+        found = depths_at_make_ups(self._stops, self._shared, self._config, self._setup)
+        std = learnt_reading_std(found, self._depth_errors, self._config.tube_length)
+        return replace(self._depth_errors, reading_std=std)
+
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
-        depths, places_of = {}, self._stops.depth_places.__getitem__
+        depths, places_of, errors = {}, self._stops.depth_places.__getitem__, self._errors_of_depths()
+        stds = length_stds(self._setup)
+        told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()}
         for one in changed:
             places = [*map(places_of, one.stops.rows)]
-            depths[one.md] = mean_depth(one.md, places, self._depth_errors, self._config.tube_length)
+            depths[one.md] = mean_depth(one.md, places, errors, self._config.tube_length, told)
         self._trajectory.put(self._directions(changed), depths)
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)
