@@ -95,11 +95,14 @@ def test_what_was_found_stands_while_it_is_looked_for_again(apart: RigModel) -> 
     assert examined.surveys == len(placed) - 1
 
 
-def test_an_honest_hole_is_not_searched(tmp_path: Path, apart: RigModel) -> None:
+def test_an_honest_hole_is_not_searched(tmp_path: Path) -> None:
     placed = passes(5, lambda _stop, station: 1.0 + 0.1 * station)
+    honest = ALIGNED | {"collar_std_deg": 2.0}
+    apart, at_once = knowing(tmp_path, [], STOPS, **honest), knowing(tmp_path, placed, STOPS, **honest)
+    apart.hole.search_apart()
     add_all(apart, placed, asked=True)
     assert not apart.hole.adopt_found()
-    assert numbers_of(apart) == numbers_of(knowing(tmp_path, placed, STOPS, **ALIGNED))
+    assert numbers_of(apart) == numbers_of(at_once)
 
 
 def test_a_station_that_comes_between_others_drops_what_was_found(apart: RigModel) -> None:
