@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from groundstation.service.alarms.encoder_cross_check import OFF_BEFORE, EncoderCrossCheck
 from groundstation.service.alarms.rig_alarms import RigAlarms
+from groundstation.service.hole.examined_hole import UNSOLVED
 from groundstation.service.hole.placement import UNTRUSTED, Placement
 from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.service.string.depth import CONTRADICTION
@@ -100,6 +101,8 @@ class Watch:
         """Tell what is wrong with the hole by its surveys, and what is not any more."""
         examined = self._hole.examined if self._hole.is_adjusted else None
         blunders = {} if examined is None else examined.by_subject
+        if self._hole.is_adjusted and self._hole.is_unsolved:
+            blunders = {"hole": [UNSOLVED]}
         for subject in self._blamed - blunders.keys():
             self._alarms.clear("blunder", subject)
         for subject, sentences in blunders.items():

@@ -28,6 +28,11 @@ SOURCE_NAMES = {
     ShareSource.BIAS: "accelerometer_bias", ShareSource.TILT: "mounts", ShareSource.COLLAR: "collar",
     ShareSource.PATH: "path",
 }  # fmt: skip
+UNEXPLAINED = "the newest surveys contradict those before; what is wrong is being looked for"
+UNSOLVED = (
+    "the surveys cannot be adjusted to each other, so every station stands for itself and nothing is found that is "
+    "wrong: check what was told of the rig, and the newest surveys"
+)
 
 
 @dataclass(frozen=True)  # with a dictionary, for what is worked out once
@@ -39,11 +44,15 @@ class ExaminedHole:
     examination : with what was found to be wrong
     run : how the string was run
     tubes : numbers of the tubes by their places
+    surveys : how many there were when it was looked for what is wrong
+    is_open : whether more seems to be wrong than was looked for yet
     """
 
     examination: Examination
     run: RunOfStops
     tubes: tuple[str, ...]
+    surveys: int
+    is_open: bool = False
 
     @property
     def adjusted(self) -> Adjusted:
@@ -57,7 +66,8 @@ class ExaminedHole:
     @property
     def doubts(self) -> list[str]:
         """Sentences of what may be one thing or another."""
-        return [self.sentence(one) for one in self.examination.blunders if one.is_doubt]
+        found = [self.sentence(one) for one in self.examination.blunders if one.is_doubt]
+        return [*found, UNEXPLAINED] if self.is_open else found
 
     def subject(self, one: Hypothesis) -> str:
         """What a blunder is of: a tube, the hole, the depth or the encoder."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, insort
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from operator import attrgetter
 
 import numpy as np
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from groundstation.config import GroundConfig
 from groundstation.service.hole.deviation_alarms import AlarmList
 from groundstation.service.hole.examined_hole import ExaminedHole
-from groundstation.service.hole.history import History
+from groundstation.service.hole.history import History, Moment
 from groundstation.service.hole.hole_adjustment import HoleAdjustment, directions_of
 from groundstation.service.hole.movement import Moved, Movement, moved_stations
 from groundstation.service.hole.resolved_stops import ResolvedStops
@@ -54,15 +54,23 @@ class SurveyedHole:
         self._config = config
         self._shared = shared
         self._setup = setup
+        self._searches_apart = False
         self._is_adjusted = config.weighting is Weighting.ADJUSTED
         self._design = config.design
         self.version = 0  # grows with every survey
         self.newest = 0  # number of the measurement that came last, revisions included
         self.begin_anew()
+        self.catch_up()
 
-    def begin_anew(self) -> None:
-        """Forget every stop; they are added again, as they are by what was told of the rig since."""
+    def begin_anew(self, kept: Iterable[Moment] = ()) -> None:
+        """Forget every stop; they are added again, as they are by what was told of the rig since, until caught up.
+
+        Parameters
+        ----------
+        kept : what was known at the end of stops, where it is to be had
+        """
         self.version += 1
+        self._is_behind = True
         self._collar = collar_direction(self._config, self._setup)
         self._depth_errors = depth_errors(self._config, self._setup)
         self._stops = ResolvedStops()
@@ -73,10 +81,13 @@ class SurveyedHole:
         self._moved: list[Moved] = []  # of the adjusted hole
         self._surveyed_back: list[float] = []  # m, in it
         self._adjustment = HoleAdjustment(self._config, self._shared)
+        if self._searches_apart:
+            self._adjustment.search_apart()
         self._examined: tuple[int, ExaminedHole | None] = (0, None)  # of the version that it is of
+        self._is_unsolved = False
         self._adjusted: dict[float, Direction] = {}  # by the depth (m) of a station, where the hole is adjusted
         self._alarms = AlarmList()
-        self._history = History()
+        self._history = History(kept)
         self._adjusted_collar: Direction = self._collar
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
         self._trajectory = self._drawn_from(self._collar)
@@ -97,7 +108,7 @@ class SurveyedHole:
         """
         at, md = stops.rows["at"].item(row), stops.rows["md"].item(row)
         if self._history.begins_stop(epoch, at):
-            self._history.add(self.deviations, self.projection)
+            self._end_stop()
         if self._is_adjusted:
             self._adjustment.make_room(stops.rows["chain"].item(row))
         stops.rows["number"][row] = self.newest + 1
@@ -115,6 +126,42 @@ class SurveyedHole:
         self._unsettled_since = min(self._unsettled_since, at)
         self._newest_at = max(self._newest_at, at)
         return True
+
+    def search_apart(self) -> None:
+        """From now on look for what is wrong on a thread of its own, so that no question waits for it."""
+        self._searches_apart = True
+        self._adjustment.search_apart()
+
+    def adopt_found(self) -> bool:
+        """Take over what a search of its own has found since the last time; whether it has."""
+        ended = self._adjustment.take_found()
+        if ended is None:
+            return False
+        number, found = ended
+        self.version += 1
+        if number == self.newest:
+            self._examined = self.version, found
+        self._unsettled_since = min(self._unsettled_since, self._newest_at)
+        return True
+
+    def catch_up(self) -> None:
+        """Every stop that was known has been added; what was known at the end of each later one is worked out."""
+        self._is_behind = False
+
+    def _end_stop(self) -> None:
+        """Keep what is known at the end of a stop. What is kept of one already is judged as it was judged then."""
+        history = self._history
+        if not (self._is_adjusted and self._is_behind):
+            history.add(self.deviations, self.projection)
+        elif (kept := history.take_over()) is not None:
+            if len(kept.where) > 1:
+                self._alarms.judge_deviation(kept.worst(first=1), kept.at)
+            if (end := kept.projection) is not None:
+                self._alarms.judge_projection(end, kept.at)
+        elif history.is_worth(len(self._stops)):
+            history.add(self.deviations, self.projection)
+        else:
+            history.pass_over()
 
     def has_untrusted(self, tube: int) -> bool:
         """Whether the yaw of any measurement of a tube is not believed."""
@@ -186,7 +233,7 @@ class SurveyedHole:
 
     @property
     def examined(self) -> ExaminedHole | None:
-        """The hole adjusted in one, and what is wrong with it; None before the first look at a station.
+        """The hole adjusted in one, and what is wrong with it; None before the first look at a station, or unsolved.
 
         Where the stations are fused one by one it stands beside them, and is worked out when it is asked for.
         """
@@ -195,9 +242,18 @@ class SurveyedHole:
             place = {id(one): number for number, one in enumerate(below, 1)}
             station_of_row = np.array([place.get(id(one), 0) for one in self._station_of], np.intp)
             mds = np.array([one.md for one in below])
-            found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar)
+            try:
+                found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar, self.newest)
+                self._is_unsolved = False
+            except (np.linalg.LinAlgError, ArithmeticError):
+                found, self._is_unsolved = None, True
             self._examined = self.version, found
         return self._examined[1]
+
+    @property
+    def is_unsolved(self) -> bool:
+        """Whether its surveys have no solution in common, so that each station stands for itself."""
+        return self.examined is None and self._is_unsolved
 
     @property
     def _below(self) -> list[SurveyStation]:
@@ -277,17 +333,30 @@ class SurveyedHole:
     def _adjust(self) -> list[SurveyStation]:
         """Adjust the hole; all of its stations have changed, and so has the direction from which it is drawn."""
         self._touched, examined, below = {}, self.examined, self._below
+        for station in self._stations:
+            station.forget_view()
         if examined is None:
+            self._stand_alone(below)
             return below
         at_collar, *found = directions_of(examined.adjusted, self._shared, north_std(self._setup))
         self._adjusted = dict(zip([one.md for one in below], found, strict=True))
         self._adjusted_collar = at_collar
         self._trajectory = self._drawn_from(at_collar)
         self._moved = moved_stations(examined, below)
+        self._surveyed_back = self._points_back(below)
+        return below
+
+    def _stand_alone(self, below: Sequence[SurveyStation]) -> None:
+        """Take every station for what its own surveys say, where they have no solution in common."""
+        self._adjusted = {one.md: one.fused(Weighting.BAYES) for one in below}
+        self._adjusted_collar, self._trajectory = self._collar, self._drawn_from(self._collar)
+        self._moved, self._surveyed_back = [], self._points_back(below)
+
+    def _points_back(self, below: Sequence[SurveyStation]) -> list[float]:
+        """Depths (m) of stations that by themselves point back against the one above."""
         tangents = tangents_of([self._collar, *(one.fused(Weighting.BAYES) for one in below)])
         back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
-        self._surveyed_back = [below[place].md for place in back.tolist()]
-        return below
+        return [below[place].md for place in back.tolist()]
 
     def _fuse(self, since: float) -> list[SurveyStation]:
         """Fuse the stations of which something may have changed since a time (s), together those with one more stop."""

@@ -11,6 +11,7 @@ from groundstation.service.alarms.watch import Watch
 from groundstation.service.answers.model import RigModel
 from groundstation.service.disk.ground_store import Store
 from groundstation.service.disk.keeper import StringKeeper
+from groundstation.service.disk.moment_keeper import MomentKeeper
 from groundstation.service.hole.deviation_alarms import DeviationAlarm
 from groundstation.service.hole.resolving import Found
 from groundstation.service.string.stored import Stored
@@ -37,6 +38,7 @@ class Learner:
         self._string, self._hole, self._placement = model.string, model.hole, model.placement
         self._orders, self._recalibration = model.orders, model.recalibration
         self._setup = model.setup
+        self._moments = MomentKeeper(store, model.config, model.setup, model.hole)
         self._followed = 0  # version of the setup by which the hole is
         self._arrived: list[Stored[Kept]] = []  # since the last transaction
         # alarms of the hole, moves and stops of the string that were told
@@ -118,13 +120,16 @@ class Learner:
         Measurements come one by one, tube by tube: to be asked at every look, and not for each of them.
         """
         hole = self._hole
+        is_explained = hole.adopt_found()
         before, self._known = self._known, (list(hole.alarms.alarms), len(hole.moved), hole.history.count)
+        self._moments.keep()
         paths = {
             "alarms": before[:2] != self._known[:2],
             "history": before[2] != self._known[2],
             **dict.fromkeys(ONCE_RESTED, self._has_rested()),
         }
-        return [path for path, has_changed in paths.items() if has_changed]
+        changed = [path for path, has_changed in paths.items() if has_changed]
+        return sorted({*changed, *self._by_survey, *ONCE_RESTED, "alarms"}) if is_explained else changed
 
     def _has_rested(self) -> bool:
         """Whether no survey has come since the last look, and some before."""
@@ -137,8 +142,9 @@ class Learner:
     def restore(self) -> None:
         """Go on with everything that was stored, some hundred messages at a time."""
         self._setup.add(self._store.told())
-        self._hole.begin_anew()
+        self._hole.begin_anew(self._moments.recall())
         self._restore_messages()
+        self._hole.catch_up()
         self.follow_setup()  # what a node says of its joints may stand in a later survey
         self.find_consequences()
 
@@ -157,10 +163,11 @@ class Learner:
                 for one in self._store.messages()
                 if isinstance(message := one.message, SurveyMeasurement) and one.md is not None
             ]
+            kept = self._moments.recall()
         except StoreError:
             return []
         self._store.damaged = damaged  # they were counted at the start
-        self._hole.begin_anew()
+        self._hole.begin_anew(kept)
         for begin in range(0, len(placed), RESTORED_TOGETHER):
             some = placed[begin : begin + RESTORED_TOGETHER]
             found = self._placement.resolve_measurements([m for m, _ in some], [md for _, md in some])
@@ -168,6 +175,7 @@ class Learner:
                 if stop is not None:
                     self._hole.add_stop(*stop, self._string.epoch_of(measurement))
         self._followed = version
+        self._hole.catch_up()
         self.find_consequences()
         return sorted({*self._by_survey, "setup", "alarms", "history", "verdict", "status"})
 

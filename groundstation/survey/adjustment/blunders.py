@@ -146,6 +146,29 @@ def examine_hole(
     return Examination(now.found, blunders, suspicion)
 
 
+def examine_known(
+    looks: Looks,
+    string: StringPrior,
+    path: PathPrior,
+    run: RunOfStops,
+    before: Examination | None = None,
+    start: StartingPoint | None = None,
+) -> tuple[Examination, bool]:
+    """Adjust a hole with what was found before, and say whether more seems to be wrong, without looking for it.
+
+    Where nothing was found before and nothing seems to be wrong it comes to the same as ``examine_hole``.
+
+    Parameters
+    ----------
+    looks, string, path, run, start : as of ``examine_hole``
+    before : of fewer looks, whose stations, stops and tubes have the places that they had
+    """
+    known, suspicion = ((), None) if before is None else (before.blunders, before.suspicion)
+    now = adjust_with(looks, string, path, run, _taken_in([*known, *filter(None, [suspicion])]), start)
+    blunders = tuple(_resized(one, now, _taken_in(known)) for one in known)
+    return Examination(now.found, blunders, suspicion), is_suspicious(now.found, run)
+
+
 def _resized(blunder: Blunder, now: TakenIn, taken_in: tuple[Hypothesis, ...]) -> Blunder:
     """A blunder with its size as all looks and the other blunders have it now; a doubt keeps those of its trials."""
     if blunder.is_doubt:

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjust import adjust_hole, linearise_all
 from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.curvature_size import curvature_deviance
 from groundstation.survey.adjustment.equations import path_equations, string_departure
 from groundstation.survey.adjustment.hypotheses import (
     BY_DEPTH,
@@ -172,7 +173,7 @@ def deviance_of(found: Adjusted) -> float:
         size += _log_size(solution.cov[core:, core:])
     before = found.string.play_std**2
     play = PLAY_KNOWN_AS * (np.log(now.play_var) + before / now.play_var)
-    return squares + size + float(play) if looks else 0.0
+    return squares + size + float(play) + curvature_deviance(now, found.path.curvature_std**2) if looks else 0.0
 
 
 def path_squares(found: Adjusted) -> tuple[float, float]:

@@ -95,6 +95,7 @@ class AdjustmentAnswer:
     play_deg: Annotated[float | None, "by which tubes lie askew in the hole from stop to stop, as the surveys show it"]
     counts: Annotated[bool, "directions and sigmas that are shown elsewhere are those of this adjustment"]
     said: Annotated[str, "how well all surveys fit, in words"]
+    searched: Annotated[int, "surveys by which it was looked for what is wrong; of the newest that may still go on"]
     toe_md_m: Annotated[float | None, "depth of the last station, the toe"]
     sigma_toe_cm: Annotated[float | None, "standard deviation at the toe, the larger of north and east"]
     blunders: list[BlunderRow]

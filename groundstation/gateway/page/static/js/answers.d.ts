@@ -486,6 +486,8 @@ export interface AdjustmentAnswer {
   counts: boolean;
   /** how well all surveys fit, in words */
   said: string;
+  /** surveys by which it was looked for what is wrong; of the newest that may still go on */
+  searched: number;
   /** depth of the last station, the toe */
   toe_md_m: number | null;
   /** standard deviation at the toe, the larger of north and east */
