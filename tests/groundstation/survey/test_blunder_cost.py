@@ -72,6 +72,6 @@ def test_the_worst_mistake_of_each_kind_comes_first_and_none_is_larger_than_it_m
         assert unfound_across(one) <= next(
             cost for kind, cost in zip(kinds, costs, strict=True) if kind is one.hypothesis.kind
         )
-    # the tube at the bit alone has read the last station: its step is the one that is found last
-    steps = {one.hypothesis.subject: one.smallest for one in told if one.hypothesis.kind is BlunderKind.BIAS_STEPPED}
-    assert max(steps, key=lambda subject: steps[subject]) == (0,)
+    # the tube at the bit alone has read the last station: its step is the one that does most
+    (step,) = (one for one in worst if one.hypothesis.kind is BlunderKind.BIAS_STEPPED)
+    assert step.hypothesis.subject == (0,)
