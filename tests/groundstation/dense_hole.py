@@ -85,7 +85,7 @@ class DenseHole:
         info = np.zeros((self.width, self.width))
         basis = self.found.linear.bases[0]
         info[:2, :2] = np.linalg.inv(basis @ path.collar_cov @ basis.T + 1e-16 * np.eye(2))
-        info[2:4, 2:4] = np.eye(2) / path.curvature_std**2
+        info[2:4, 2:4] = np.eye(2) / self.found.now.curvature_var
         for k, length in enumerate(np.diff(self.md)):
             std = self.found.now.leg_vars[min(k, len(self.found.now.leg_vars) - 1)] ** 0.5
             go, spread = walk(length, path.correlation_length, std)

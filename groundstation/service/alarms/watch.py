@@ -267,7 +267,8 @@ class Watch:
         bit = string.bit
         comparable = was_heard and not silent and string.knows_tubes
         misfit = string.tally.misfit(bit, string.heard) if bit is not None and comparable else ""
-        self._alarms.hold("depth_contradicts", "depth", misfit)
+        by_surveys = self._hole.depth_misfit(self._depths.accepted_at(self._time.epoch))
+        self._alarms.hold("depth_contradicts", "depth", misfit or by_surveys)
 
     def _look_at_surveys(self) -> None:
         time, waiting = self._time, self._placement.waiting

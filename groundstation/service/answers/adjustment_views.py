@@ -58,7 +58,7 @@ def answer_adjustment(k: RigModel, _p: Parameters) -> AdjustmentAnswer:
     examined, counts = k.hole.examined, k.hole.is_adjusted
     if examined is None:
         said = UNSOLVED if k.hole.is_unsolved else NOTHING
-        return AdjustmentAnswer(0, 0.0, None, None, counts, said, 0, None, None, [], [], [], LEFT_OUT, [], [], None)
+        return AdjustmentAnswer(0, 0.0, None, None, counts, said, None, None, 0, [], [], [], LEFT_OUT, [], [], None)
     found, wrong = examined.adjusted, examined.examination.blunders
     budget = budget_of_toe(k, examined)
     return AdjustmentAnswer(
@@ -67,10 +67,10 @@ def answer_adjustment(k: RigModel, _p: Parameters) -> AdjustmentAnswer:
         misfit=examined.examination.global_ratio,
         play_deg=math.degrees(math.sqrt(found.now.play_var)),
         counts=counts,
-        searched=examined.surveys,
         said=UNEXPLAINED if examined.is_open else say_fit(len(found.looks), len(wrong), len(examined.doubts)),
         toe_md_m=float(found.path.md[-1]),
         sigma_toe_cm=CM * std_across(np.sum([one.variances for one in budget], axis=0)),
+        searched=examined.surveys,
         blunders=[blunder_row(examined, *one) for one in zip(wrong, examined.costs, strict=True)],
         toe=toe_shares(budget),
         parts=toe_parts(budget),

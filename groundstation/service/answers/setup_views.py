@@ -17,7 +17,10 @@ from groundstation.service.setup.setup_items import ALONG, SetupItem, missing_na
 from groundstation.service.setup.toe_costs import designed_course
 
 SHOWN_UNITS = {"rad": "deg", "rad/s": "deg/s", "rad/m": "deg/m"}  # what people read in place of a unit
-LEFT_OUT = "random noise of the readings, and blunders that are not found"
+LEFT_OUT = (
+    "random noise of the readings, and blunders that are not found. A slip in telling north, the stick-up or a "
+    "length is in no reading: take a second bearing, set the bit at the collar's edge, tape the tubes"
+)
 
 
 @view_of(SetupAnswer)

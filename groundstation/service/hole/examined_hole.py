@@ -70,11 +70,13 @@ class ExaminedHole:
         return [*found, UNEXPLAINED] if self.is_open else found
 
     def subject(self, one: Hypothesis) -> str:
-        """What a blunder is of: a tube, the hole, the depth or the encoder."""
+        """What a blunder is of: a tube, the hole, the collar, the depth or the encoder."""
         if one.kind is BlunderKind.HOLE_MOVED:
             return "hole"
         if one.kind in (BlunderKind.DEPTH_WRONG_ONCE, BlunderKind.DEPTH_WRONG_FROM):
             return "depth"
+        if one.kind is BlunderKind.COLLAR_WRONG:
+            return "collar"
         return f"tube {self.tubes[one.subject[0]]}" if one.subject else "encoder"
 
     @property

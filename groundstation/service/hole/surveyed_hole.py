@@ -10,6 +10,7 @@ import itertools
 import math
 from bisect import bisect_left, insort
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
@@ -23,8 +24,10 @@ from groundstation.service.hole.hole_adjustment import HoleAdjustment, direction
 from groundstation.service.hole.movement import Moved, Movement, moved_stations
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
+from groundstation.service.hole.told_depths import depths_at_make_ups
 from groundstation.service.setup.setup_book import SetupBook
 from groundstation.service.setup.setup_priors import collar_direction, depth_errors, length_stds, north_std
+from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
@@ -32,9 +35,11 @@ from groundstation.survey.fusion.survey_trust import Trust
 from groundstation.survey.fusion.tangents import tangents_of
 from groundstation.survey.fusion.transport import Carried, carry_directions
 from groundstation.survey.path.curvature_tendency import CurvatureTendency, learn_curvature
+from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.wall.column_deviation import Deviations, axis_deviations
 from groundstation.survey.wall.projected_end import ProjectedEnd, project_to_target
-from groundstation.survey.well.depth_errors import mean_depth
+from groundstation.survey.well.depth_errors import DepthErrors, mean_depth
+from groundstation.survey.well.make_up_depths import learnt_reading_std, misfit_of_depths
 from groundstation.survey.well.trajectory import TURNED_BACK, Trajectory
 
 Array = npt.NDArray[np.float64]
@@ -73,6 +78,7 @@ class SurveyedHole:
         self._is_behind = True
         self._collar = collar_direction(self._config, self._setup)
         self._depth_errors = depth_errors(self._config, self._setup)
+        self._misfit: tuple[int, float, str] = (0, 0.0, "")  # of depths, by version and since when
         self._stops = ResolvedStops()
         self._station_of: list[SurveyStation] = []  # of each of its rows
         self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
@@ -342,6 +348,7 @@ class SurveyedHole:
         self._adjusted = dict(zip([one.md for one in below], found, strict=True))
         self._adjusted_collar = at_collar
         self._trajectory = self._drawn_from(at_collar)
+        self._bend_as(examined.adjusted)
         self._moved = moved_stations(examined, below)
         self._surveyed_back = self._points_back(below)
         return below
@@ -358,6 +365,13 @@ class SurveyedHole:
         back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
         return [below[place].md for place in back.tolist()]
 
+    def _bend_as(self, found: Adjusted) -> None:
+        """Have what lies between stations follow the curvature that the adjustment has learnt."""
+        wander = LegWander(math.sqrt(found.now.curvature_var), self._config.curvature_length)
+        driven = found.now.leg_vars / found.now.curvature_var
+        driven[:-1] = np.maximum(driven[:-1], driven[1:])  # what bends sharply may have begun above the station
+        self._trajectory.bend_as(wander, driven)
+
     def _fuse(self, since: float) -> list[SurveyStation]:
         """Fuse the stations of which something may have changed since a time (s), together those with one more stop."""
         by_depth = self._touched | self._movement.judge_since(since)
@@ -368,12 +382,29 @@ class SurveyedHole:
             SurveyStation.add_newest(grown, newest)
         return changed
 
+    def depth_misfit(self, since: float) -> str:
+        """Why the depths of surveys after a rig time (s) do not fit the tubes, in words, or nothing."""
+        if self._misfit[:2] != (self.version, since):
+            found = depths_at_make_ups(self._stops, self._shared, self._config, self._setup, since)
+            what = misfit_of_depths(found, self._depth_errors, self._config.tube_length)
+            self._misfit = self.version, since, what
+        return self._misfit[2]
+
+    def _errors_of_depths(self) -> DepthErrors:
+        """Errors of measured depths; where the whole hole is worked out anew, as far as they scatter at make-ups."""
+        if not self._is_adjusted:
+            return self._depth_errors
+        found = depths_at_make_ups(self._stops, self._shared, self._config, self._setup)
+        std = learnt_reading_std(found, self._depth_errors, self._config.tube_length)
+        return replace(self._depth_errors, reading_std=std)
+
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
-        depths, places_of, stds = {}, self._stops.depth_places.__getitem__, length_stds(self._setup)
+        depths, places_of, errors = {}, self._stops.depth_places.__getitem__, self._errors_of_depths()
+        stds = length_stds(self._setup)
         told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()}
         for one in changed:
             places = [*map(places_of, one.stops.rows)]
-            depths[one.md] = mean_depth(one.md, places, self._depth_errors, self._config.tube_length, told)
+            depths[one.md] = mean_depth(one.md, places, errors, self._config.tube_length, told)
         self._trajectory.put(self._directions(changed), depths)
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)

@@ -82,7 +82,8 @@ def adjust_hole(
         if solution.step < SETTLED and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var and is_bent:
             break
         tried = [*tried, (now.play_var, play)] if solution.step < NEAR else []
-        now = replace(now, play_var=faster_play(tried) if tried else play, curvature_var=whole, leg_vars=legs)
+        play = faster_play(tried) if tried else play
+        now = replace(now, play_var=play, curvature_var=whole, leg_vars=legs)
     return found
 
 

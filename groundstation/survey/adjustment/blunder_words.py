@@ -33,6 +33,7 @@ SENTENCES: Mapping[BlunderKind, str] = {
     K.AXES_EXCHANGED: "x and y of tube {tube} are exchanged from the stop at {depth} on",
     K.TUBES_EXCHANGED: "tubes {tube} and {other} are exchanged",
     K.LOOK_WRONG: "reading of tube {tube} at the stop at {depth} is off by {size}",
+    K.COLLAR_WRONG: "direction at the collar is off by {size}, more than was told of it or of north",
 }
 
 AGAIN = "survey again, the string turned to another angle: the readings do not tell which of the two it is"

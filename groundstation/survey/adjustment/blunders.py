@@ -16,7 +16,15 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.hypotheses import BY_DEPTH, KNOWN_SIZE, WIDTHS, Hypothesis, all_hypotheses
+from groundstation.survey.adjustment.collar import collar_departure
+from groundstation.survey.adjustment.hypotheses import (
+    BY_DEPTH,
+    KNOWN_SIZE,
+    WIDTHS,
+    BlunderKind,
+    Hypothesis,
+    all_hypotheses,
+)
 from groundstation.survey.adjustment.looks import Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.scores import Score, log_chances, log_tail, score_hypotheses
@@ -31,9 +39,8 @@ MOST_TRIED = 8
 AS_GOOD = 0.3  # part of the best's logarithm that is worth trying; play hides the rest
 PARTED = math.log(100.0)  # by how much the best outdoes the second, or it is a doubt
 MOST_BLUNDERS = 4
-TUBES_MISCOUNTED = (
-    1.5  # spacings of the stations by which a depth may be off: a tube too many, and what it is off beside
-)
+TUBES_MISCOUNTED = 1.5  # spacings of stations by which a depth may be off: one tube too many, and a little
+COLLAR = Hypothesis(BlunderKind.COLLAR_WRONG, ())
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +114,11 @@ class Examination:
     def global_ratio(self) -> float:
         """Weighted squares of what is left over what they are to be: 1 in an honest hole."""
         return global_ratio(self.adjusted)
+
+    @property
+    def doubts_collar(self) -> bool:
+        """Whether what was told of the collar counts no more, for a blunder or the suspicion of one."""
+        return COLLAR in _taken_in([*self.blunders, *filter(None, [self.suspicion])])
 
 
 def global_ratio(found: Adjusted) -> float:
@@ -198,7 +210,7 @@ def find_blunder(
     """
     found = now.found
     hypotheses = [one for one in all_hypotheses(looks, run) if one not in known]
-    worth = best_of_kinds(score_hypotheses(found, run, hypotheses), found)
+    worth = best_of_kinds([*score_hypotheses(found, run, hypotheses), *_score_of_collar(found, known)], found)
     if not worth:
         return None
     many = log_of_level(looks, run)
@@ -222,6 +234,15 @@ def is_plausible(one: Hypothesis, size: Array, run: RunOfStops) -> bool:
     return one.kind not in BY_DEPTH or abs(float(size[0])) <= TUBES_MISCOUNTED * spacing
 
 
+def _score_of_collar(found: Adjusted, known: tuple[Hypothesis, ...]) -> list[Score]:
+    """How well it explains what is left that the collar was told wrong; nothing where that is taken in."""
+    if COLLAR in known:
+        return []
+    off = collar_departure(found)
+    free = np.asarray(np.linalg.pinv(off.cov), np.float64)[None]
+    return [Score((COLLAR,), off.size[None], free, np.array([off.told], np.intp), np.array([off.squares]))]
+
+
 def chance_of_one(looks: Looks, run: RunOfStops) -> float:
     """Chance of a false alarm that one hypothesis has at the last stop, so that a whole hole keeps its own."""
     return FALSE_ALARM * math.exp(-log_of_level(looks, run))
@@ -229,8 +250,8 @@ def chance_of_one(looks: Looks, run: RunOfStops) -> float:
 
 def log_of_level(looks: Looks, run: RunOfStops) -> float:
     """Logarithm of how many chances an honest hole has: of all hypotheses, and of all stops."""
-    hypotheses = sum(1 for _ in all_hypotheses(looks, run))
-    return math.log(max(1, hypotheses)) + log_of_stops(looks)
+    hypotheses = 1 + sum(1 for _ in all_hypotheses(looks, run))  # and the collar
+    return math.log(hypotheses) + log_of_stops(looks)
 
 
 def log_of_stops(looks: Looks) -> float:
@@ -269,7 +290,10 @@ def _tried(
 
 def _explained(with_one: TakenIn, found: Adjusted, one: Hypothesis, many: float) -> Explanation:
     """What a hypothesis explains, from the likelihood of the looks without and with it."""
-    gain = max(0.0, deviance_of(found) - deviance_of(with_one.found))
+    if one == COLLAR:
+        gain = collar_departure(found).squares  # the likelihood is that of the looks, and the collar is in none
+    else:
+        gain = max(0.0, deviance_of(found) - deviance_of(with_one.found))
     free = max(1.0, with_one.found.redundancy)
     squares = math.expm1(min(gain / free, 500.0)) * free
     told = np.array([WIDTHS[one.kind]])

@@ -27,9 +27,9 @@ LEAST = 1e-12  # rad^2/m^2
 
 
 def learnt_curvature(found: Adjusted) -> tuple[float, Array]:
-    """Variance (rad^2/m^2) of the curvature of the hole, and that by which each leg (s,) is driven: a step of iteration.
+    """Variance (rad^2/m^2) of the curvature of the hole, and that by which each leg (s,) is driven.
 
-    The departures of the legs are weighed as they stand, so the two settle together.
+    It is a step of iteration. The departures of the legs are weighed as they stand, so the two settle together.
     """
     before, legs = found.path.curvature_std**2, found.now.leg_vars
     if not len(legs):
@@ -39,7 +39,10 @@ def learnt_curvature(found: Adjusted) -> tuple[float, Array]:
     seen = np.einsum("ka,kab,kb->k", off, rigid, off)
     free = off.shape[1] - np.einsum("kab,kba->k", rigid, departure_covs(found, go)) / legs
     weights = found.now.curvature_var / legs
-    whole = (HOLE_KNOWN_AS * before + float(weights @ seen)) / (HOLE_KNOWN_AS + float(free.sum()))
+    at_collar = found.now.curvatures[0]
+    seen_at_all = float(weights @ seen) + float(at_collar @ at_collar)
+    free_at_all = float(free.sum()) + 2.0 - float(np.trace(found.covs[0, 2:, 2:])) / found.now.curvature_var
+    whole = (HOLE_KNOWN_AS * before + seen_at_all) / (HOLE_KNOWN_AS + free_at_all)
     each = (LEG_KNOWN_AS * whole + seen) / (LEG_KNOWN_AS + free)
     return max(whole, LEAST), np.maximum(each, LEAST)
 

@@ -46,7 +46,7 @@ def path_equations(path: PathPrior, start: StartingPoint, bases: Array) -> tuple
     off = bends_between(np.stack([start.tangents[0], path.collar]), bases[:1].repeat(2, axis=0))[0]
     diagonal[0, :2, :2] += collar
     right[0, :2] += collar @ off
-    rigid = path.curvature_std**-2
+    rigid = 1.0 / start.curvature_var
     diagonal[0, 2:, 2:] += rigid * np.eye(2)
     right[0, 2:] -= rigid * start.curvatures[0]
     if count > 1:

@@ -46,6 +46,7 @@ class BlunderKind(StrEnum):
     AXES_EXCHANGED = auto()
     TUBES_EXCHANGED = auto()
     LOOK_WRONG = auto()
+    COLLAR_WRONG = auto()
 
 
 K = BlunderKind
@@ -59,7 +60,7 @@ OF_CHAIN = (K.JOINT_SLIPPED, K.JOINT_MISREAD, K.ENCODER_SLIPPED)
 BY_TURN = (K.MOUNT_TURNED, K.MOUNT_MISREAD, *OF_CHAIN)
 WIDTHS = {
     **dict.fromkeys(OF_FORCE, 3),
-    **dict.fromkeys((*BY_TILT, K.HOLE_MOVED), 2),
+    **dict.fromkeys((*BY_TILT, K.HOLE_MOVED, K.COLLAR_WRONG), 2),
     **dict.fromkeys((*BY_TURN, *BY_DEPTH, *KNOWN_SIZE), 1),
 }
 
@@ -67,6 +68,8 @@ WIDTHS = {
 @dataclass(frozen=True, slots=True)
 class Hypothesis:
     """One thing that may be wrong.
+
+    The direction at the collar is in no look: that it was told wrong changes what is known of the path, see ``collar``.
 
     Parameters
     ----------

@@ -4,8 +4,9 @@ A tube that lies along the unit vector d and is turned by psi about it reads, at
 
     f = g (m + t x m + t x (t x m) / 2) + b,    m = (R(-psi) (d_N, d_E), -d_D),    t = (tilt, 0),
 
-(a mount is half a degree off: to first order alone its tilt would make the force longer by what a bias may be) and its yaw is psi plus the turn of its chain plus an error of its own, which is estimated look by look: a yaw that is
-hardly known puts the lean on a circle, not on a straight line. What is left is linear.
+and its yaw is psi plus the turn of its chain plus an error of its own, which is estimated look by look: a yaw that is
+hardly known puts the lean on a circle, not on a straight line. What is left is linear. A tilt is taken to second order,
+for a mount is half a degree off: to first order it would make the force longer by what a bias may be.
 Source: thesis eqs. 1.1-1.3; Gauss and Newton's method.
 """
 
@@ -16,7 +17,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.arithmetic.jit import kernel
+from node.kernels.arithmetic.jit import allocating_kernel, kernel
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
@@ -101,7 +102,7 @@ def invert_in_place(m: Array) -> None:
     m[1, 0], m[2, 0], m[2, 1] = m[0, 1], m[0, 2], m[1, 2]
 
 
-@kernel
+@allocating_kernel
 def add_looks(
     station: Places, tube: Places, make_up: Places, jacobians: Array, weights: Array, residuals: Array, extra: Array,
     gravity_at: int, at_station: Array, coupled: Array, in_common: Array,
