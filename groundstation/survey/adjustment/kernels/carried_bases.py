@@ -7,13 +7,13 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.arithmetic.jit import kernel
+from node.kernels.arithmetic.jit import allocating_kernel, kernel
 
 Array = npt.NDArray[np.float64]
 TINY = 1e-12
 
 
-@kernel
+@allocating_kernel
 def carry_bases(tangents: Array, bases: Array) -> None:
     """Set bases (s, 2, 3) across unit vectors (s, 3), of which the first is given.
 
