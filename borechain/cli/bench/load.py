@@ -130,7 +130,7 @@ def learn(surveys: int, tubes: int, stops: int, as_json: bool) -> None:
     with tempfile.TemporaryDirectory(prefix="borechain-") as folder:
         result: dict[str, Any] = {"bench": "learn", "tubes": tubes}
         result |= measure_learning(surveys, tubes, stops, Path(folder))
-        calls = {one: max(count_placing_calls(Path(folder) / one, one)) for one in CALLS_AT_MOST}
+        calls = {one: max(count_placing_calls(Path(folder) / one.value, one)) for one in CALLS_AT_MOST}
         result["calls_to_place_one"] = [
             {"weighting": one.value, "max": most, "bound": CALLS_AT_MOST[one], "holds": most <= CALLS_AT_MOST[one]}
             for one, most in calls.items()

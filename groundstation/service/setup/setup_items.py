@@ -29,6 +29,7 @@ DEG = math.radians(1.0)
 COLLAR_STD = 1.0 * DEG  # each way, of a rig that is set up by eye and level
 MOUNT_TILT_STD = 0.5 * DEG  # of an IMU as it is mounted in its tube, until an alignment has found it
 JOINT_STD = 0.05 * DEG  # of a scribe mark that a node was told; the ground station does not hear its own
+STICK_UP_STD = 0.1  # m, until it is told
 GRAVITY_STD = 2e-3  # m/s^2, of what is entered for the site
 ALONG = (SetupKind.LENGTH, SetupKind.STICK_UP, SetupKind.DEPTH_SCALE)  # errors of the depth
 BARE = "bare sensor"
@@ -100,15 +101,7 @@ def _items_of_rig(config: GroundConfig, book: SetupBook) -> Iterator[SetupItem]:
     for kind, unit, needed, values, sigma, source, detail in (
         (SetupKind.NORTH, "rad", True, (), UNKNOWN_YAW_STD, SetupSource.DEFAULT, "not told: any azimuth may be"),
         (SetupKind.COLLAR, "rad", False, design, COLLAR_STD, SetupSource.DESIGN, "not told: as the design"),
-        (
-            SetupKind.STICK_UP,
-            "m",
-            False,
-            (0.0,),
-            config.depth_offset_std,
-            SetupSource.DEFAULT,
-            "not told: as with a rule",
-        ),
+        (SetupKind.STICK_UP, "m", False, (0.0,), untold_stick_up_std(config), SetupSource.DEFAULT, "not told"),
     ):
         told = book.standing(kind)
         if told is None:
@@ -189,6 +182,11 @@ def _mount_item(config: GroundConfig, string: KnownString, tube: int) -> SetupIt
         return SetupItem(kind, subject, (0.0, 0.0), std, "rad", SetupSource.TOLD, CONFIGURATION, CONFIGURATION)
     detail = "not aligned: as it is mounted"
     return SetupItem(kind, subject, (0.0, 0.0), std, "rad", SetupSource.DESIGN, detail)
+
+
+def untold_stick_up_std(config: GroundConfig) -> float:
+    """Standard deviation (m) of a stick-up that was not told."""
+    return max(config.depth_offset_std, STICK_UP_STD)
 
 
 def accelerometer_std(config: GroundConfig) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from groundstation.config import GroundConfig
 from groundstation.service.setup.setup_book import SetupBook
-from groundstation.service.setup.setup_items import COLLAR_STD, STICK_UP_STD, SetupItem
+from groundstation.service.setup.setup_items import COLLAR_STD, SetupItem, untold_stick_up_std
 from groundstation.service.setup.told_value import SetupKind
 from groundstation.survey.fusion.resolve import Direction, known_direction
 from groundstation.survey.well.depth_errors import DepthErrors
@@ -66,7 +66,7 @@ def collar_direction(config: GroundConfig, book: SetupBook) -> Direction:
 def depth_errors(config: GroundConfig, book: SetupBook) -> DepthErrors:
     """Errors of measured depths but for those of lengths that were told; of a stick-up wide where none was."""
     usual, told = config.depth_errors, book.standing(SetupKind.STICK_UP)
-    return replace(usual, offset_std=max(usual.offset_std, STICK_UP_STD) if told is None else told.sigma)
+    return replace(usual, offset_std=untold_stick_up_std(config) if told is None else told.sigma)
 
 
 def length_stds(book: SetupBook) -> Mapping[int, float]:
