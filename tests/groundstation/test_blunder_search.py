@@ -7,8 +7,8 @@ import pytest
 from string_passes import Placed, knowing, passes
 from test_adjusted_hole import ALIGNED, blamed, numbers_of
 
-from groundstation.service.alarms.verdict import VerdictDoubt
 from groundstation.service.alarms.verdict_doubts import known_of
+from groundstation.service.alarms.verdict_words import VerdictDoubt
 from groundstation.service.answers.model import RigModel
 from groundstation.service.hole.examined_hole import UNEXPLAINED
 

@@ -37,9 +37,9 @@ from groundstation.service.hole.examined_hole import LEVEL, UNEXPLAINED, UNSOLVE
 from groundstation.service.setup.setup_priors import north_std
 from groundstation.service.setup.toe_costs import TURN_MOST
 from groundstation.survey.adjustment.blunder_cost import BlunderCost
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunder_words import STANDARD_GRAVITY, advise_crew, say_explanation, unit_of
 from groundstation.survey.adjustment.blunders import Blunder
-from groundstation.survey.adjustment.hypotheses import BlunderKind
 from groundstation.survey.adjustment.least_found import unfound_across, worst_of_kinds
 from groundstation.survey.adjustment.reliability import Reliability
 from groundstation.survey.adjustment.tube_biases import bias_of_tube

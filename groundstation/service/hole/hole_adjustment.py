@@ -26,8 +26,9 @@ from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import Packed, SharedErrors
 from groundstation.survey.fusion.sphere_direction import SphereDirection, tangent_errors
-from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR, Trust
+from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
+from groundstation.survey.fusion.trust_level import Trust
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]

@@ -31,9 +31,9 @@ from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
-from groundstation.survey.fusion.survey_trust import Trust
 from groundstation.survey.fusion.tangents import tangents_of
 from groundstation.survey.fusion.transport import Carried, carry_directions
+from groundstation.survey.fusion.trust_level import Trust
 from groundstation.survey.path.curvature_tendency import CurvatureTendency, learn_curvature
 from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.wall.column_deviation import Deviations, axis_deviations

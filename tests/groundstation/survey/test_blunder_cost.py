@@ -12,9 +12,9 @@ from drawn_strings import DEG, MG, DrawnString, draw_string
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunder_cost import cost_blunders
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunder_words import ADVICE, MISTAKES
 from groundstation.survey.adjustment.blunders import examine_hole
-from groundstation.survey.adjustment.hypotheses import BlunderKind
 from groundstation.survey.adjustment.least_found import LARGEST, possible_mistakes, unfound_across, worst_of_kinds
 from groundstation.survey.adjustment.looks import Looks
 from groundstation.survey.adjustment.reliability import measure_reliability

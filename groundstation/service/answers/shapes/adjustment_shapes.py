@@ -6,7 +6,7 @@ from typing import Annotated
 
 from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
 from groundstation.service.answers.shapes.string_shapes import Tube
-from groundstation.survey.adjustment.hypotheses import BlunderKind
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 
 Name = Annotated[str, "what it is of, such as a tube; empty of all"]
 
