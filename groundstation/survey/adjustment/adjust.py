@@ -89,12 +89,12 @@ def adjust_hole(
             tried = [*tried, (now.play_var, play)] if solution.step < NEAR else []
             now = replace(now, play_var=faster_play(tried) if tried else play)
         if again and not is_bent:
-            of_hole = float(part_of_way(now.curvature_var, whole))
-            now = replace(now, curvature_var=of_hole, leg_vars=part_of_way(now.leg_vars, legs))
+            between = part_of_way(np.append(now.leg_vars, now.curvature_var), np.append(legs, whole))
+            now = replace(now, curvature_var=float(between[-1]), leg_vars=between[:-1])
     return found
 
 
-def part_of_way(before: Array | float, after: Array | float) -> Array:
+def part_of_way(before: Array, after: Array) -> Array:
     """Most of the way from variances to others, by their logarithms, for a whole step goes too far."""
     return np.asarray(before * (after / before) ** PART)
 
