@@ -100,7 +100,7 @@ def test_an_honest_hole_is_not_searched(tmp_path: Path) -> None:
     placed = passes(5, lambda _stop, station: 1.0 + 0.1 * station)
     honest = ALIGNED | {"collar_std_deg": 2.0}
     apart, at_once = knowing(tmp_path, [], STOPS, **honest), knowing(tmp_path, placed, STOPS, **honest)
-    apart.hole.search_apart()
+    apart.hole.search_apart(run_on_thread)
     add_all(apart, placed, asked=True)
     assert not apart.hole.adopt_found()
     assert numbers_of(apart) == numbers_of(at_once)
