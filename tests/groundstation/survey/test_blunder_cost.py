@@ -29,10 +29,14 @@ def toe_of(found: Adjusted) -> Array:
     return np.asarray(leg_weights(found.path.md) @ found.now.tangents)
 
 
-def variance_of_toe(found: Adjusted) -> Array:
-    weights = toe_weights(found)
-    states, _ = found.cofactor(weights, np.zeros((len(found.common_cov), 3)))
-    return np.asarray(np.einsum("sar,sar->r", weights, states[:, :2]))
+def variances_with_and_without(found: Adjusted) -> tuple[Array, Array]:
+    """Variances (3,) of the toe, and those that it has where all further unknowns are known."""
+    weights, width = toe_weights(found), found.string.width
+    states, common = found.cofactor(weights, np.zeros((len(found.common_cov), 3)))
+    of_toe = np.einsum("sar,saq->rq", weights, states[:, :2])
+    of_both = np.block([[of_toe, common[width:].T], [common[width:], found.common_cov[width:, width:]]])
+    known = np.linalg.inv(np.linalg.inv(of_both)[:3, :3])
+    return np.diagonal(of_toe), np.diagonal(known)
 
 
 def stepped(drawn: DrawnString, size: Array) -> Looks:
@@ -53,8 +57,8 @@ def test_a_step_costs_what_the_toe_moves_by_it_and_what_it_is_less_known_for_it(
     right, little = (adjust_hole(stepped(drawn, (part - 1.0) * size), drawn.string, drawn.path) for part in (0.0, PART))
     moved = (toe_of(little) - toe_of(right)) / PART
     assert cost.moved[:2] == pytest.approx(-moved[:2], rel=0.1, abs=0.05 * float(np.linalg.norm(moved)))
-    more = variance_of_toe(examination.adjusted) - variance_of_toe(right)
-    assert cost.variances[:2] == pytest.approx(more[:2], rel=0.15, abs=0.02 * float(variance_of_toe(right)[:2].max()))
+    whole, known = variances_with_and_without(examination.adjusted)
+    assert cost.variances == pytest.approx(whole - known, rel=1e-6, abs=1e-9 * float(whole.max()))
 
 
 def test_the_worst_mistake_of_each_kind_comes_first_and_none_is_larger_than_it_may_be() -> None:
