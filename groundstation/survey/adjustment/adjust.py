@@ -26,13 +26,14 @@ from groundstation.survey.adjustment.equations import (
 from groundstation.survey.adjustment.kernels.observations import add_looks, linearise_looks
 from groundstation.survey.adjustment.kernels.path_elimination import eliminate_path, substitute_path
 from groundstation.survey.adjustment.looks import OF_TUBE, FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
-from groundstation.survey.adjustment.play import PLAY_KNOWN_AS, learnt_play
+from groundstation.survey.adjustment.play import PLAY_KNOWN_AS, faster_play, learnt_play
 from groundstation.survey.adjustment.sphere import carried_bases, step_directions
 from groundstation.survey.adjustment.starting_point import first_start
 
 Array = npt.NDArray[np.float64]
 ITERATIONS = 12
-SETTLED = 1e-3  # standard deviations, of the last step
+SETTLED = 1e-2  # standard deviations, of the last step; what is left then is a thirtieth of it
+NEAR = 3.0  # standard deviations, of a step from which on the play is not that of unknowns still on their way
 PLAY_SETTLED = 0.02  # of its variance
 LEGS_SETTLED = 0.2  # of the logarithm of the variance of each leg
 PART = 0.75
@@ -65,12 +66,15 @@ def adjust_hole(
     if len(now.extra) != len(extra.std):
         now = replace(now, extra=np.zeros(len(extra.std)))
     known, is_bent = string_information(string, extra), False
+    tried: list[tuple[float, float]] = []
     for again in range(ITERATIONS):
         bases = carried_bases(now.tangents)
         linear = linearise_all(looks, now, bases, extra)
         solution = solve_equations(
             looks, linear, path_equations(path, now, bases), known, string_departure(string, now), extra
         )
+        if not np.isfinite(solution.step):
+            raise np.linalg.LinAlgError("expected a step of the unknowns, got numbers that are none")
         now = _stepped(now, bases, solution)
         found = Adjusted(looks, string, path, extra, now, linear, solution, known)
         play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)
@@ -79,7 +83,8 @@ def adjust_hole(
             is_bent = bool(np.all(np.abs(np.log(legs / now.leg_vars)) <= LEGS_SETTLED))
         if solution.step < SETTLED and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var and is_bent:
             break
-        now = replace(now, play_var=play)
+        tried = [*tried, (now.play_var, play)] if solution.step < NEAR else []
+        now = replace(now, play_var=faster_play(tried) if tried else play)
         if again and not is_bent:
             between = part_of_way(np.append(now.leg_vars, now.curvature_var), np.append(legs, whole))
             now = replace(now, curvature_var=float(between[-1]), leg_vars=between[:-1])
