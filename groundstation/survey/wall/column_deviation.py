@@ -27,6 +27,7 @@ from groundstation.survey.well.well_plan import WellPlan
 Array = npt.NDArray[np.float64]
 NORMAL_95 = 1.959963984540054  # standard deviations, either side
 ROUNDED = 1e-12  # of a ratio
+UPWARD = 1e-12  # of 1 + cos I, of a direction that is straight up
 LEVELS = (0.5, 0.8, 1.0)  # of the tolerance, at which an alarm is due
 
 
@@ -140,6 +141,20 @@ class ColumnDesign:
         """Points (n, 3) at lengths (n,) along the axis, m."""
         head = np.array(self.head)
         return head + (along[:, None] * self.axis if self.plan is None else self.plan.points_at(along).points)
+
+    def across_at(self, along: Array) -> Array:
+        """Two unit vectors (n, 2, 3) across the axis at lengths (n,) along it, m: as in ``Deviations.offset``."""
+        if self.plan is None:
+            return np.broadcast_to(self.across, (len(along), 2, 3))
+        return planes_across(self.plan.points_at(along).tangents)
+
+    @cached_property
+    def chord(self) -> Array:
+        """Unit vector (3,) from head to toe."""
+        if self.plan is None:
+            return self.axis
+        way = self.plan.positions[-1]
+        return np.asarray(way / np.linalg.norm(way))
 
     @cached_property
     def end(self) -> DesignEnd:
@@ -258,10 +273,10 @@ def planes_across(tangents: Array) -> Array:
     """Two unit vectors (..., 2, 3) across directions (..., 3): north and east, tilted with the direction.
 
     They are high side and right turned back by the azimuth, so that they stay as they are where a plan passes the
-    vertical; they have no value straight up.
+    vertical. Straight up they are north and east again, and turn with the azimuth all about it.
     """
     x, y, z = np.moveaxis(tangents, -1, 0)
-    apart = 1.0 + z
+    apart = np.maximum(1.0 + z, UPWARD)
     first = np.stack([1.0 - x * x / apart, -x * y / apart, -x], axis=-1)
     return np.stack([first, np.stack([-x * y / apart, 1.0 - y * y / apart, -y], axis=-1)], axis=-2)
 
