@@ -14,10 +14,13 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.survey.bearings import planes_across
 from groundstation.survey.fusion.fusion import Stack
-from groundstation.survey.fusion.resolve import Direction, Quality
-from groundstation.survey.fusion.shared import CAUSES, Places, columns_of, weights_of
-from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR, Trust
+from groundstation.survey.fusion.packed import Packed
+from groundstation.survey.fusion.resolve import Quality
+from groundstation.survey.fusion.shared import CAUSES, Places, columns_of
+from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR, SphereDirection
+from groundstation.survey.fusion.survey_trust import Trust
 from telemetry.messages import NodeFlag
 
 Array = npt.NDArray[np.float64]
@@ -33,11 +36,9 @@ ROW: Final = np.dtype(
         *((name, np.uint32) for name in ("tube", "width", "chain")),
         *((name, np.uint8) for name in ("trust", "quality")),
         *((name, np.float64) for name in ("at", "md", "yaw", "yaw_var", "systematic_var", "force_var", "settle_time")),
-        ("lean", np.float64, 2),
-        ("down", np.float64),
-        ("cov", np.float64, (2, 2)),
-        ("information", np.float64, (2, 2)),
-        ("causes", np.float64, (2, CAUSES)),
+        ("tangent", np.float64, 3),
+        ("cov", np.float64, (3, 3)),
+        ("causes", np.float64, (3, CAUSES)),
         ("departed", np.float64, 2),
         ("departure", np.float64),
     ]
@@ -45,12 +46,13 @@ ROW: Final = np.dtype(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ResolvedStop(Direction):
+class ResolvedStop:
     """One tube at one stop: the direction that it found, how far that is trusted, and at which depth.
 
-    ``shared`` (2, s) holds the columns of the direction, ``causes`` (2, 5) and ``places`` what they are made of.
+    ``causes`` (3, 5) and ``places`` are what the shared columns of the direction are made of.
     """
 
+    direction: SphereDirection
     tube: int
     sequence: int
     at: float  # s, rig time
@@ -115,16 +117,17 @@ class ResolvedStops:
     def __len__(self) -> int:
         return len(self.forces)
 
-    def weigh(self) -> None:
-        """Work out the information of all stops.
+    def check_weights(self) -> None:
+        """Refuse stops that cannot be weighed by the inverse of what they do not know.
 
         Raises
         ------
         numpy.linalg.LinAlgError
-            When one of them cannot be weighed.
+            When one of them has none.
         """
-        rows = self.rows[: len(self.forces)]
-        rows["information"] = weights_of(rows["cov"], rows["causes"], self.places, int(rows["width"].max()))
+        numbers = list(range(len(self.forces)))
+        axes = planes_across(self.column("tangent"))
+        np.linalg.inv(axes @ self.covs(numbers) @ axes.transpose(0, 2, 1))
 
     def append_stop(self, other: ResolvedStops, row: int) -> int:
         """Add a stop of another table, from which no departure is known yet; returns its row."""
@@ -163,19 +166,19 @@ class ResolvedStops:
             return np.asarray(np.frombuffer(b"".join(kept)).reshape(len(kept), -1, AXES).mean(axis=1))
         return np.array([np.frombuffer(one).reshape(-1, AXES).mean(axis=0) for one in kept])
 
-    def direction(self, row: int) -> Direction:
+    def direction(self, row: int) -> SphereDirection:
         """Direction of the stop in a row, with its columns."""
         found = self.stack([row])
-        return Direction(found.lean[0], float(found.down[0]), found.cov[0], found.shared[0])
+        return SphereDirection(found.tangents[0], found.covs[0], Packed(found.shared[0]))
 
     def stack(self, numbers: Sequence[int]) -> Stack:
         """Directions of the stops in several rows, side by side."""
         rows, places = self.rows[numbers], [*map(self.places.__getitem__, numbers)]
         shared = columns_of(rows["causes"], places, int(rows["width"].max()))
-        return Stack(rows["lean"], rows["down"], rows["cov"], rows["information"], shared)
+        return Stack(rows["tangent"], rows["cov"], shared)
 
     def covs(self, numbers: Sequence[int]) -> Array:
-        """Covariances (n, 2, 2) of the leans of the stops in several rows, what they share with others included."""
+        """Covariances (n, 3, 3) of the unit vectors of the stops in several rows, with what they share with others."""
         widths = self.rows["width"][numbers]
         covs = self.rows["cov"][numbers]
         for width in np.unique(widths).tolist():
@@ -190,7 +193,7 @@ class ResolvedStops:
         """The stop in a row."""
         row, direction = self.rows[number], self.direction(number)
         return ResolvedStop(
-            direction.lean, direction.down, direction.cov, direction.shared,
+            direction,
             **{name: row[name].item() for name in PLAIN},
             forces=tuple(tuple(force) for force in forces_of(self.forces[number])),
             flags=NodeFlag(int(row["flags"])),
@@ -198,7 +201,7 @@ class ResolvedStops:
             trust=Trust(int(row["trust"])),
             causes=row["causes"].copy(),
             places=self.places[number],
-        )  # fmt: skip
+        )
 
 
 def forces_of(kept: bytes) -> list[list[float]]:

@@ -25,8 +25,9 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
+from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Direction, direction_angles
-from groundstation.survey.fusion.shared import Packed, add_shared_errors
+from groundstation.survey.fusion.shared import add_shared_errors
 from groundstation.survey.fusion.sphere_direction import tangent_errors
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
 from groundstation.survey.path.leg_wander import LegWander

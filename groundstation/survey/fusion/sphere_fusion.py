@@ -1,0 +1,180 @@
+"""Readings of one direction as one, on the sphere: whatever the inclination, and however poorly yaws are known.
+
+An error of a reading's yaw turns it about the vertical. What that turn is most likely is estimated reading by reading,
+so that a yaw which is hardly known puts a reading on its circle and not on a straight line; what is left is linear in
+the plane across the direction, and weighed by the inverse of all that the reading does not know. So an inclination does
+not depend on its yaw.
+Source: Gauss and Newton's method; information filter, as thesis eqs. 3.39-3.42. Frame: north, east, down; rad.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.bearings import planes_across
+from groundstation.survey.fusion.packed import Packed
+from groundstation.survey.fusion.sphere_direction import SphereDirection, bows_of, yaw_variances
+
+Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
+STEPS = 30  # at the most
+SETTLED = 1e-24  # of the square of a step in standard deviations
+TINY = 1e-300
+
+
+def fuse_on_sphere(tangents: Array, covs: Array, packed: Sequence[Packed], begin: Places) -> list[SphereDirection]:
+    """Directions of several stations (k), of each from its readings; the same bit for bit as of one after the other.
+
+    Parameters
+    ----------
+    tangents, covs : (n, 3) and (n, 3, 3), readings with what is random in each
+    packed : (n) of (3, s), what they share with others
+    begin : (k + 1,) first reading of each station, and the end
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When a reading cannot be weighed.
+    """
+    counts = np.diff(begin)
+    station, others = np.repeat(np.arange(len(counts)), counts), np.repeat(1.0 - 1.0 / counts, counts)
+    totals = covs + np.array([one.values @ one.values.T for one in packed])
+    now, (yaw_vars, along) = _first_directions(tangents, totals, begin), yaw_variances(tangents, totals)
+    moving = np.ones(len(now), np.bool_)
+    for _ in range(STEPS):
+        seen = _Seen(now[station], tangents, yaw_vars, along, others)
+        step, information = _solved(seen, seen.covs(totals, yaw_vars), begin)
+        # a station that has settled stays: what it comes to does not depend on others that have not
+        now = np.where(moving[:, None], _stepped(now, step), now)
+        moving &= np.einsum("ka,kab,kb->k", step, information, step) > SETTLED
+        if not moving.any():
+            break
+    return _directions(now, tangents, covs, totals, packed, begin, station)
+
+
+class _Seen:
+    """Readings (n) as they are seen from directions (n, 3): turned back by the error of each yaw.
+
+    Parameters
+    ----------
+    yaw_vars, along : (n,) rad^2, of the yaw of each, and of the rest, see ``yaw_variances``
+    others : (n,), what share of a direction is of other readings than each
+
+    Attributes
+    ----------
+    axes : (n, 2, 3) across the directions
+    turned : (n, 2, 3), an error of a reading, turned back, in these
+    apart : (n, 2) from the direction to the reading, with the error of its yaw as it is linear
+    level : (n, 2) what a rad of yaw moves the direction by
+    """
+
+    def __init__(self, now: Array, tangents: Array, yaw_vars: Array, along: Array, others: Array | float = 1.0) -> None:
+        x, y = now[:, 0], now[:, 1]
+        u, v = tangents[:, 0], tangents[:, 1]
+        sine, cosine = x * v - y * u, x * u + y * v  # of the angle between the leans, times both
+        error, strength = np.zeros(len(now)), yaw_vars / np.maximum(along, TINY)
+        full = np.arctan2(sine, cosine)
+        lever = np.hypot(sine, cosine) * strength
+        error = full * lever / (1.0 + lever)
+        for _ in range(3):  # the likeliest: where error / yaw_vars pulls as much as the force does
+            left = full - error
+            error -= (error - lever * np.sin(left)) / (1.0 + lever * np.maximum(np.cos(left), 0.0))
+        squares = x * x + y * y
+        # the error that fits best takes a part of the force's own error with it, and so makes the lean too long
+        share = squares * strength / (1.0 + squares * strength)
+        longer = others * yaw_vars * (1.0 - share) * (1.0 - 0.5 * share)
+        c, s = np.cos(error), np.sin(error)
+        back = np.zeros((len(now), 3, 3))
+        back[:, 0, 0] = back[:, 1, 1] = c
+        back[:, 0, 1], back[:, 1, 0], back[:, 2, 2] = s, -s, 1.0
+        self.axes = planes_across(now)
+        self.turned = self.axes @ back
+        self.level = (self.axes @ _by_yaw(now)[:, :, None])[:, :, 0]
+        self._there = (self.turned @ _by_yaw(tangents)[:, :, None])[:, :, 0]
+        seen = (back @ tangents[:, :, None])[:, :, 0]
+        across = (self.axes @ seen[:, :, None])[:, :, 0]
+        size = np.sqrt((across**2).sum(axis=1))
+        angle = np.arctan2(size, (seen * now).sum(axis=1))
+        across *= np.where(size > 0.0, angle / np.where(size > 0.0, size, 1.0), 1.0)[:, None]
+        outward = (self.axes @ (now * [1.0, 1.0, 0.0])[:, :, None])[:, :, 0]
+        self.apart = across + error[:, None] * self.level - longer[:, None] * outward
+
+    def covs(self, covs: Array, yaw_vars: Array) -> Array:
+        """Covariances (n, 2, 2) of readings: what is of a yaw (rad^2) moves the direction and not what was read."""
+        here, there = (side[:, :, None] * side[:, None] for side in (self.level, self._there))
+        return self.turned @ covs @ np.swapaxes(self.turned, 1, 2) + yaw_vars[:, None, None] * (here - there)
+
+
+def _by_yaw(tangents: Array) -> Array:
+    """Change of directions (n, 3) for one rad of yaw."""
+    return np.stack([-tangents[:, 1], tangents[:, 0], np.zeros(len(tangents))], axis=1)
+
+
+def _first_directions(tangents: Array, totals: Array, begin: Places) -> Array:
+    """The best reading (k, 3) of each station."""
+    sizes = np.trace(totals, axis1=1, axis2=2)
+    first = [int(a + np.argmin(sizes[a:b])) for a, b in zip(begin[:-1].tolist(), begin[1:].tolist(), strict=True)]
+    return tangents[first]
+
+
+def _solved(seen: _Seen, covs: Array, begin: Places) -> tuple[Array, Array]:
+    """Step (k, 2) of each station, and the information (k, 2, 2) on it, from covariances (n, 2, 2) of its readings."""
+    weights = np.linalg.inv(covs)
+    information = np.add.reduceat(weights, begin[:-1])
+    right = np.add.reduceat((weights @ seen.apart[:, :, None])[:, :, 0], begin[:-1])
+    return np.linalg.solve(information, right[:, :, None])[:, :, 0], information
+
+
+def _stepped(now: Array, step: Array) -> Array:
+    """Directions (k, 3) after steps (k, 2) along great circles."""
+    size = np.sqrt((step**2).sum(axis=1))[:, None]
+    toward = (step[:, None] @ planes_across(now))[:, 0] * np.sinc(size / np.pi)
+    moved = np.cos(size) * now + toward
+    return np.asarray(moved / np.sqrt((moved**2).sum(axis=1))[:, None])
+
+
+def _directions(
+    now: Array, tangents: Array, covs: Array, totals: Array, packed: Sequence[Packed], begin: Places, station: Places
+) -> list[SphereDirection]:
+    """Directions where the iteration ended, with what their readings' errors come to."""
+    yaw_vars, along = yaw_variances(tangents, totals)
+    seen = _Seen(now[station], tangents, yaw_vars, along)
+    weights = np.linalg.inv(seen.covs(totals, yaw_vars))
+    gains = np.linalg.inv(np.add.reduceat(weights, begin[:-1]))[station] @ weights
+    back = np.swapaxes(planes_across(now), 1, 2)
+    random = seen.covs(covs, yaw_variances(tangents, covs)[0])
+    own = back @ np.add.reduceat(gains @ random @ np.swapaxes(gains, 1, 2), begin[:-1]) @ np.swapaxes(back, 1, 2)
+    acted = np.swapaxes(seen.axes, 1, 2) @ gains @ seen.turned  # of a reading's error on the direction
+    found = []
+    for k, (a, b) in enumerate(zip(begin[:-1].tolist(), begin[1:].tolist(), strict=True)):
+        width = max(one.width for one in packed[a:b])
+        columns = np.zeros((3, width))
+        for matrix, one in zip(acted[a:b], packed[a:b], strict=True):
+            columns[:, one.places] += matrix @ one.values
+        shared = Packed(columns)
+        total = own[k] + shared.values @ shared.values.T
+        left, _ = yaw_variances(now[k : k + 1], total[None])
+        found.append(SphereDirection(now[k].copy(), own[k].copy(), shared, bows_of(now[k : k + 1], left)[0]))
+    return found
+
+
+def off_direction(
+    tangents: Array, covs: Array, shared: Array, others: Array, other_covs: Array, other_shared: Array
+) -> tuple[Array, Array]:
+    """By how much (n, 2) other directions are off some, and the covariance (n, 2, 2) of that, across the latter.
+
+    What both share, columns (n, 3, s) alike, cancels.
+    """
+    mine, its = (
+        yaw_variances(at, own + columns @ np.swapaxes(columns, 1, 2))
+        for at, own, columns in ((tangents, covs, shared), (others, other_covs, other_shared))
+    )
+    yaw_vars, along = (one + other for one, other in zip(mine, its, strict=True))
+    between = _Seen(tangents, others, yaw_vars, along)
+    apart = between.turned @ other_shared - between.axes @ shared
+    random = between.turned @ other_covs @ np.swapaxes(between.turned, 1, 2)
+    random += between.axes @ covs @ np.swapaxes(between.axes, 1, 2)
+    return between.apart, random + apart @ np.swapaxes(apart, 1, 2)
