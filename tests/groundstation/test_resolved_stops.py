@@ -119,7 +119,8 @@ def test_what_is_shown_of_many_surveys_is_what_each_of_them_says() -> None:
         (stds,) = stds_of_directions([one.direction])
         assert (view["seq"], view["tube"], view["station"], view["md_m"]) == (one.number, one.tube, station, one.md)
         assert (view["inclination_deg"], view["azimuth_deg"]) == (math.degrees(inclination), math.degrees(azimuth))
-        assert (view["sigma_inclination_deg"], view["sigma_azimuth_deg"]) == tuple(map(math.degrees, stds))
+        shown_stds = (view["sigma_inclination_deg"], view["sigma_azimuth_deg"])
+        assert shown_stds == pytest.approx(tuple(map(math.degrees, stds)), rel=1e-12)
         assert view["forces_mps2"] == [list(force) for force in one.forces]
         assert view["flags"] == (["restored"] if one.flags else [])
         assert view["trust"] == one.trust.name.lower()

@@ -37,8 +37,8 @@ ROW: Final = np.dtype(
         *((name, np.uint8) for name in ("trust", "quality")),
         *((name, np.float64) for name in ("at", "md", "yaw", "yaw_var", "systematic_var", "force_var", "settle_time")),
         ("tangent", np.float64, 3),
-        ("cov", np.float64, (3, 3)),
-        ("causes", np.float64, (3, CAUSES)),
+        ("cov", np.float64, (2, 2)),
+        ("causes", np.float64, (2, CAUSES)),
         ("departed", np.float64, 2),
         ("departure", np.float64),
     ]
@@ -102,7 +102,7 @@ class ResolvedStops:
 
     Attributes
     ----------
-    rows : of the table, some of them not used yet
+    rows : of the table, some of them not used yet; covariance and causes across the direction, see ``planes_across``
     forces : (imus, 3) of each stop as bytes, m/s^2
     places : of the columns of each stop, see ``groundstation.survey.fusion.shared``
     depth_places : of the columns of the depth of each
@@ -125,9 +125,7 @@ class ResolvedStops:
         numpy.linalg.LinAlgError
             When one of them has none.
         """
-        numbers = list(range(len(self.forces)))
-        axes = planes_across(self.column("tangent"))
-        np.linalg.inv(axes @ self.covs(numbers) @ axes.transpose(0, 2, 1))
+        np.linalg.inv(self._covs_across(list(range(len(self.forces)))))
 
     def append_stop(self, other: ResolvedStops, row: int) -> int:
         """Add a stop of another table, from which no departure is known yet; returns its row."""
@@ -169,16 +167,25 @@ class ResolvedStops:
     def direction(self, row: int) -> SphereDirection:
         """Direction of the stop in a row, with its columns."""
         found = self.stack([row])
-        return SphereDirection(found.tangents[0], found.covs[0], Packed(found.shared[0]))
+        random, systematic = found.yaw_vars[0].tolist()
+        return SphereDirection(found.tangents[0], found.covs[0], Packed(found.shared[0]), (random, systematic))
 
     def stack(self, numbers: Sequence[int]) -> Stack:
         """Directions of the stops in several rows, side by side."""
         rows, places = self.rows[numbers], [*map(self.places.__getitem__, numbers)]
-        shared = columns_of(rows["causes"], places, int(rows["width"].max()))
-        return Stack(rows["tangent"], rows["cov"], shared)
+        back = planes_across(rows["tangent"]).transpose(0, 2, 1)
+        shared = back @ columns_of(rows["causes"], places, int(rows["width"].max()))
+        unknown = UNKNOWN_YAW_VAR * (rows["trust"] == Trust.UNKNOWN_YAW)
+        yaw_vars = np.stack([rows["yaw_var"] + unknown, rows["systematic_var"]], axis=1)
+        return Stack(rows["tangent"], back @ rows["cov"] @ back.transpose(0, 2, 1), shared, yaw_vars)
 
     def covs(self, numbers: Sequence[int]) -> Array:
         """Covariances (n, 3, 3) of the unit vectors of the stops in several rows, with what they share with others."""
+        axes = planes_across(self.rows["tangent"][numbers])
+        return np.asarray(axes.transpose(0, 2, 1) @ self._covs_across(numbers) @ axes)
+
+    def _covs_across(self, numbers: Sequence[int]) -> Array:
+        """The same (n, 2, 2), across the directions."""
         widths = self.rows["width"][numbers]
         covs = self.rows["cov"][numbers]
         for width in np.unique(widths).tolist():
@@ -199,7 +206,7 @@ class ResolvedStops:
             flags=NodeFlag(int(row["flags"])),
             quality=Quality(int(row["quality"])),
             trust=Trust(int(row["trust"])),
-            causes=row["causes"].copy(),
+            causes=planes_across(row["tangent"]).T @ row["causes"],
             places=self.places[number],
         )
 

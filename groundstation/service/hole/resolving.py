@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.service.hole.resolved_stops import AXES, NO_NUMBER, ResolvedStops
+from groundstation.survey.bearings import planes_across
 from groundstation.survey.fusion.resolve import check_all, combine_imus, resolve_all
 from groundstation.survey.fusion.shared import SharedErrors, causes_of_all
 from groundstation.survey.fusion.survey_trust import trust_of, with_trusts
@@ -94,7 +95,7 @@ class Resolver:
         for row, (m, tubes) in enumerate(zip(measurements, above, strict=True)):
             stops.places.append(self._shared.places_of(m.tube, tubes))
             rows["width"][row], rows["chain"][row] = self._shared.count, self._shared.chain_of(m.tube, tubes)
-        rows["causes"] = causes_of_all(
+        rows["causes"] = planes_across(rows["tangent"]) @ causes_of_all(
             by_yaw, by_force, stops.places, rows["systematic_var"], self._mount_var, self._bias_std
         )
         return stops
@@ -113,7 +114,8 @@ class Resolver:
         resolved = resolve_all(*combined, sent["yaw"].tolist(), sent["yaw_var"])
         quality = check_all(forces, covs, combined, self._gravity, sent["samples"], sent["settle_time"], self._noise)
         found = with_trusts(resolved, sent["trust"].tolist())
-        rows["tangent"][own], rows["cov"][own] = found.tangent, found.cov
+        axes = planes_across(found.tangent)
+        rows["tangent"][own], rows["cov"][own] = found.tangent, axes @ found.cov @ axes.transpose(0, 2, 1)
         rows["quality"][own], rows["force_var"][own] = quality, force_vars(covs)
         for row, each in zip(own, forces, strict=True):
             stops.forces[row] = each.tobytes()

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from groundstation.survey.fusion.packed import Packed, packed_each
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.sphere_direction import SphereDirection, on_sphere
-from groundstation.survey.fusion.sphere_fusion import fuse_on_sphere, off_direction
+from groundstation.survey.fusion.sphere_fusion import Directions, fuse_on_sphere, off_direction
 
 Array = npt.NDArray[np.float64]
 # a departure in the plane is beyond this length as often (4.55 %) as one number is beyond two standard deviations
@@ -51,18 +51,23 @@ POWERS = {Weighting.EQUAL: 0, Weighting.LINEAR: 1, Weighting.QUADRATIC: 2, Weigh
 
 @dataclass(frozen=True, slots=True)
 class Stack:
-    """Readings side by side, unit vectors with their errors: (n, 3), (n, 3, 3) and (n, 3, s)."""
+    """Readings side by side, unit vectors with their errors: (n, 3), (n, 3, 3) and (n, 3, s).
+
+    ``yaw_vars`` (n, 2), rad^2, are what of these is of a yaw: random, and shared.
+    """
 
     tangents: Array
     covs: Array
     shared: Array
+    yaw_vars: Array
 
 
 def stack_of(readings: Sequence[Direction]) -> Stack:
     """Return readings stacked along a first axis (n,)."""
     found = [*map(on_sphere, readings)]
     tangents, covs = np.array([one.tangent for one in found]), np.array([one.own for one in found])
-    return Stack(tangents, covs, _columns_of(found, max(one.width for one in found)))
+    yaw_vars = np.array([one.yaw_vars for one in found])
+    return Stack(tangents, covs, _columns_of(found, max(one.width for one in found)), yaw_vars)
 
 
 def _columns_of(directions: Sequence[SphereDirection], width: int) -> Array:
@@ -124,7 +129,8 @@ class GrowingBayes:
     def fuse_each(growing: Sequence[GrowingBayes], ranges: Sequence[tuple[int, int]], readings: Stack) -> None:
         """Fuse the readings of several ranges, which stand one after the other; each as by itself bit for bit."""
         begin = np.cumsum([0, *(end - first for first, end in ranges)])
-        found = fuse_on_sphere(readings.tangents, readings.covs, packed_each(readings.shared), begin)
+        packed = packed_each(readings.shared)
+        found = fuse_on_sphere(readings.tangents, readings.covs, packed, readings.yaw_vars, begin)
         for one, (first, end), direction in zip(growing, ranges, found, strict=True):
             one._keep(first, end, direction)
 
@@ -143,7 +149,8 @@ def fuse_by_bayes(readings: Sequence[Direction]) -> SphereDirection:
     """Recursive Bayes of at least one reading, see ``sphere_fusion``."""
     found = [*map(on_sphere, readings)]
     tangents, covs = np.array([one.tangent for one in found]), np.array([one.own for one in found])
-    return fuse_on_sphere(tangents, covs, [one.packed for one in found], np.array([0, len(found)]))[0]
+    yaw_vars = np.array([one.yaw_vars for one in found])
+    return fuse_on_sphere(tangents, covs, [one.packed for one in found], yaw_vars, np.array([0, len(found)]))[0]
 
 
 def sequence_weights(count: int, power: int) -> Array:
@@ -164,7 +171,8 @@ def fuse_by_scheme(readings: Sequence[Direction], scheme: Weighting) -> Directio
     own = np.sum([w * w * one.own for w, one in zip(weights, found, strict=True)], axis=0)
     columns = _columns_of(found, max(one.width for one in found))
     shared = np.sum([w * each for w, each in zip(weights, columns, strict=True)], axis=0)
-    return SphereDirection(tangent, own, Packed(shared))
+    yaw_vars = tuple((weights**2 @ np.array([one.yaw_vars for one in found])).tolist())
+    return SphereDirection(tangent, own, Packed(shared), yaw_vars)
 
 
 def adaptive_weighting(readings: Sequence[Direction]) -> Weighting:
@@ -193,10 +201,12 @@ def departures_from(earlier: Sequence[SphereDirection], newest: Stack) -> list[D
     width = max(newest.shared.shape[2], *(one.width for one in earlier))
     shared = np.zeros((len(earlier), 3, width))
     shared[:, :, : newest.shared.shape[2]] = newest.shared
-    apart, covs = off_direction(
+    before = Directions(
         np.array([one.tangent for one in earlier]), np.array([one.own for one in earlier]), _columns_of(earlier, width),
-        newest.tangents, newest.covs, shared,
+        np.array([sum(one.yaw_vars) for one in earlier]),
     )  # fmt: skip
+    after = Directions(newest.tangents, newest.covs, shared, newest.yaw_vars.sum(axis=1))
+    apart, covs = off_direction(before, after)
     squares = apart[:, None] @ np.linalg.solve(covs, apart[:, :, None])
     return [(one, math.sqrt(square)) for one, square in zip(apart, squares[:, 0, 0].tolist(), strict=True)]
 

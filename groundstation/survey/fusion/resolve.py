@@ -94,6 +94,7 @@ class Resolved:
     cov: Array  # (n, 3, 3) of it
     by_force: Array  # (n, 3, 3) its change for one m/s^2 on each body axis
     by_yaw: Array  # (n, 3) its change for one rad of yaw
+    yaw_var: Array  # (n,) rad^2, of what is random in the yaw; it is in the covariance
 
     @property
     def lean(self) -> Array:
@@ -105,7 +106,7 @@ class Resolved:
         """Direction of one stop."""
         from groundstation.survey.fusion.sphere_direction import bare_direction  # which is a direction as defined here
 
-        return bare_direction(self.tangent, self.cov)
+        return bare_direction(self.tangent, self.cov, float(self.yaw_var))
 
 
 def resolve_direction(force: Array, force_cov: Array, yaw: float, yaw_var: float) -> Resolved:
@@ -122,7 +123,7 @@ def resolve_direction(force: Array, force_cov: Array, yaw: float, yaw_var: float
         When the force vanishes or is not finite, or nothing is uncertain in some direction across the tube.
     """
     found = resolve_all(force[None], force_cov[None], [yaw], [yaw_var])
-    return Resolved(found.tangent[0], found.cov[0], found.by_force[0], found.by_yaw[0])
+    return Resolved(found.tangent[0], found.cov[0], found.by_force[0], found.by_yaw[0], found.yaw_var[0])
 
 
 def resolve_all(forces: Array, covs: Array, yaws: Sequence[float], yaw_vars: Sequence[float] | Array) -> Resolved:
@@ -144,13 +145,14 @@ def resolve_all(forces: Array, covs: Array, yaws: Sequence[float], yaw_vars: Seq
     tangents = (turns @ units[:, :, None])[:, :, 0]
     by_force = (turns - tangents[:, :, None] * units[:, None]) / sizes[:, None, None]
     by_yaw = np.stack([-tangents[:, 1], tangents[:, 0], np.zeros(len(tangents))], axis=1)
-    turned = np.array(yaw_vars)[:, None, None] * (by_yaw[:, :, None] * by_yaw[:, None])
+    known = np.array(yaw_vars, float)
+    turned = known[:, None, None] * (by_yaw[:, :, None] * by_yaw[:, None])
     found = by_force @ covs @ by_force.transpose(0, 2, 1) + turned
     axes = planes_across(tangents)
     across = axes @ found @ axes.transpose(0, 2, 1)
     if not is_covariance(across):
         raise SurveyError(f"resolve: expected a positive definite covariance across the tube, got {across.tolist()}")
-    return Resolved(tangents, found, by_force, by_yaw)
+    return Resolved(tangents, found, by_force, by_yaw, known)
 
 
 def is_covariance(covs: Array) -> bool:

@@ -39,8 +39,8 @@ def put_columns(columns: Array, causes: Array, places: Places) -> None:
 
 
 def columns_of(causes: Array, places: Sequence[Places], width: int) -> Array:
-    """Columns (n, 3, width) of several readings, from (n, 3, 5) and the places of each."""
-    columns = np.zeros((len(causes), 3, width))
+    """Columns (n, k, width) of several readings, from (n, k, 5) and the places of each."""
+    columns = np.zeros((len(causes), causes.shape[1], width))
     counts = np.array([*map(len, places)])
     ends = counts.cumsum()
     cause = np.ones(ends[-1], np.intp)  # of a place: every joint alike
@@ -81,7 +81,8 @@ class SharedErrors:
         causes, places = self.causes_of(resolved, tube, above, systematic_var, mount_var, force_bias_std)
         columns = np.zeros((3, len(self._columns)))
         put_columns(columns, causes, places)
-        return SphereDirection(resolved.tangent, resolved.cov, Packed(columns))
+        yaw_vars = float(resolved.yaw_var), float(systematic_var)
+        return SphereDirection(resolved.tangent, resolved.cov, Packed(columns), yaw_vars)
 
     def causes_of(
         self,

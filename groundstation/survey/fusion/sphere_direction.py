@@ -31,16 +31,20 @@ class SphereDirection(Direction):
     """Direction with covariance and shared columns of its unit vector.
 
     It is regular at every inclination: that of a level hole moves up and down, which its lean does not show.
+    ``yaw_vars`` (rad^2) are what of the covariance, and of the columns, is of a yaw.
     """
 
-    __slots__ = ("bow", "own", "packed")
+    __slots__ = ("bow", "own", "packed", "yaw_vars")
     own: Array  # (3, 3), covariance of the unit vector that no other shares
     packed: Packed  # (3, s) of the unit vector
+    yaw_vars: tuple[float, float]
     bow: Array  # (3, 3), what its circle adds in space
 
-    def __init__(self, tangent: Array, own: Array, packed: Packed, bow: Array = SURE) -> None:
+    def __init__(
+        self, tangent: Array, own: Array, packed: Packed, yaw_vars: tuple[float, float] = (0.0, 0.0), bow: Array = SURE
+    ) -> None:
         named = {"lean": tangent[:2], "down": float(tangent[2]), "cov": own[:2, :2], "own": own, "packed": packed}
-        for name, value in (named | {"bow": bow}).items():
+        for name, value in (named | {"yaw_vars": yaw_vars, "bow": bow}).items():
             object.__setattr__(self, name, value)
 
     @property
@@ -69,9 +73,9 @@ class SphereDirection(Direction):
         return np.asarray(self.own + values @ values.T)
 
 
-def bare_direction(tangent: Array, cov: Array) -> SphereDirection:
-    """Direction (3,) with the covariance (3, 3) of its unit vector, which shares nothing."""
-    return SphereDirection(tangent, cov, Packed(np.zeros((3, 0))))
+def bare_direction(tangent: Array, cov: Array, yaw_var: float = 0.0) -> SphereDirection:
+    """Direction (3,) with the covariance (3, 3) of its unit vector, which shares nothing; of its yaw, rad^2."""
+    return SphereDirection(tangent, cov, Packed(np.zeros((3, 0))), (yaw_var, 0.0))
 
 
 def on_sphere(direction: Direction) -> SphereDirection:
@@ -127,15 +131,12 @@ def stds_of_directions(directions: Sequence[Direction]) -> list[tuple[float, flo
     return stds_of_angles(np.array([*map(TANGENT, found)]), np.array([one.tangent_cov for one in found]))
 
 
-def yaw_variances(tangents: Array, covs: Array) -> tuple[Array, Array]:
-    """What of covariances (n, 3, 3) is of a yaw: its variance (n,), rad^2, and the variance (n,) across a tube without.
-
-    A force knows both directions across a tube equally well, so what is more across the inclination is the yaw's.
-    """
+def yaw_variances(tangents: Array, covs: Array) -> Array:
+    """What of covariances (n, 3, 3) is of a yaw (n,), rad^2: a force knows both axes across a tube alike."""
     along, across, squares = polar_variances(tangents, covs)
     known = squares >= UPRIGHT**2
     found = np.where(known, np.maximum(across - along, 0.0) / np.where(known, squares, 1.0), 0.0)
-    return np.minimum(found, UNKNOWN_YAW_VAR), along
+    return np.minimum(found, UNKNOWN_YAW_VAR)
 
 
 def bows_of(tangents: Array, yaw_vars: Array) -> Array:

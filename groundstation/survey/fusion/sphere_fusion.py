@@ -10,13 +10,14 @@ Source: Gauss and Newton's method; information filter, as thesis eqs. 3.39-3.42.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.bearings import planes_across
 from groundstation.survey.fusion.packed import Packed
-from groundstation.survey.fusion.sphere_direction import SphereDirection, bows_of, yaw_variances
+from groundstation.survey.fusion.sphere_direction import SphereDirection, bows_of, polar_variances, yaw_variances
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
@@ -25,13 +26,16 @@ SETTLED = 1e-24  # of the square of a step in standard deviations
 TINY = 1e-300
 
 
-def fuse_on_sphere(tangents: Array, covs: Array, packed: Sequence[Packed], begin: Places) -> list[SphereDirection]:
+def fuse_on_sphere(
+    tangents: Array, covs: Array, packed: Sequence[Packed], yaw_vars: Array, begin: Places
+) -> list[SphereDirection]:
     """Directions of several stations (k), of each from its readings; the same bit for bit as of one after the other.
 
     Parameters
     ----------
     tangents, covs : (n, 3) and (n, 3, 3), readings with what is random in each
     packed : (n) of (3, s), what they share with others
+    yaw_vars : (n, 2) rad^2, what of the former and of the latter is of a yaw
     begin : (k + 1,) first reading of each station, and the end
 
     Raises
@@ -40,19 +44,25 @@ def fuse_on_sphere(tangents: Array, covs: Array, packed: Sequence[Packed], begin
         When a reading cannot be weighed.
     """
     counts = np.diff(begin)
-    station, others = np.repeat(np.arange(len(counts)), counts), np.repeat(1.0 - 1.0 / counts, counts)
-    totals = covs + np.array([one.values @ one.values.T for one in packed])
-    now, (yaw_vars, along) = _first_directions(tangents, totals, begin), yaw_variances(tangents, totals)
+    station = np.repeat(np.arange(len(counts)), counts)
+    totals, all_yaws = covs + np.array([one.values @ one.values.T for one in packed]), yaw_vars.sum(axis=1)
+    along, _, _ = polar_variances(tangents, totals)
+    alone = yaw_vars[:, 0] * np.repeat(1.0 - 1.0 / counts, counts)  # a reading by itself is not too long
+    now = _first_directions(tangents, totals, begin)
     moving = np.ones(len(now), np.bool_)
     for _ in range(STEPS):
-        seen = _Seen(now[station], tangents, yaw_vars, along, others)
-        step, information = _solved(seen, seen.covs(totals, yaw_vars), begin)
+        seen = _Seen(now[station], tangents, all_yaws, along, alone)
+        step, information = _solved(seen, seen.covs(totals, all_yaws), begin)
         # a station that has settled stays: what it comes to does not depend on others that have not
         now = np.where(moving[:, None], _stepped(now, step), now)
         moving &= np.einsum("ka,kab,kb->k", step, information, step) > SETTLED
         if not moving.any():
             break
-    return _directions(now, tangents, covs, totals, packed, begin, station)
+    seen = _Seen(now[station], tangents, all_yaws, along, alone)
+    weights = np.linalg.inv(seen.covs(totals, all_yaws))
+    gains = np.linalg.inv(np.add.reduceat(weights, begin[:-1]))[station] @ weights
+    random = gains @ seen.covs(covs, yaw_vars[:, 0]) @ np.swapaxes(gains, 1, 2)
+    return _directions(now, np.add.reduceat(random, begin[:-1]), gains @ seen.turned, packed, begin)
 
 
 class _Seen:
@@ -60,8 +70,8 @@ class _Seen:
 
     Parameters
     ----------
-    yaw_vars, along : (n,) rad^2, of the yaw of each, and of the rest, see ``yaw_variances``
-    others : (n,), what share of a direction is of other readings than each
+    yaw_vars, along : (n,) rad^2, of the yaw of each, and of its inclination
+    alone : (n,) rad^2, of the part of the yaw that is of each alone, as far as the direction is that of others
 
     Attributes
     ----------
@@ -71,7 +81,7 @@ class _Seen:
     level : (n, 2) what a rad of yaw moves the direction by
     """
 
-    def __init__(self, now: Array, tangents: Array, yaw_vars: Array, along: Array, others: Array | float = 1.0) -> None:
+    def __init__(self, now: Array, tangents: Array, yaw_vars: Array, along: Array, alone: Array | float = 0.0) -> None:
         x, y = now[:, 0], now[:, 1]
         u, v = tangents[:, 0], tangents[:, 1]
         sine, cosine = x * v - y * u, x * u + y * v  # of the angle between the leans, times both
@@ -85,7 +95,7 @@ class _Seen:
         squares = x * x + y * y
         # the error that fits best takes a part of the force's own error with it, and so makes the lean too long
         share = squares * strength / (1.0 + squares * strength)
-        longer = others * yaw_vars * (1.0 - share) * (1.0 - 0.5 * share)
+        longer = alone * (1.0 - share) * (1.0 - 0.5 * share)
         c, s = np.cos(error), np.sin(error)
         back = np.zeros((len(now), 3, 3))
         back[:, 0, 0] = back[:, 1, 1] = c
@@ -100,7 +110,7 @@ class _Seen:
         angle = np.arctan2(size, (seen * now).sum(axis=1))
         across *= np.where(size > 0.0, angle / np.where(size > 0.0, size, 1.0), 1.0)[:, None]
         outward = (self.axes @ (now * [1.0, 1.0, 0.0])[:, :, None])[:, :, 0]
-        self.apart = across + error[:, None] * self.level - longer[:, None] * outward
+        self.apart = across + error[:, None] * self.level - np.expand_dims(longer, 1) * outward
 
     def covs(self, covs: Array, yaw_vars: Array) -> Array:
         """Covariances (n, 2, 2) of readings: what is of a yaw (rad^2) moves the direction and not what was read."""
@@ -137,44 +147,48 @@ def _stepped(now: Array, step: Array) -> Array:
 
 
 def _directions(
-    now: Array, tangents: Array, covs: Array, totals: Array, packed: Sequence[Packed], begin: Places, station: Places
+    now: Array, covs: Array, acted: Array, packed: Sequence[Packed], begin: Places
 ) -> list[SphereDirection]:
-    """Directions where the iteration ended, with what their readings' errors come to."""
-    yaw_vars, along = yaw_variances(tangents, totals)
-    seen = _Seen(now[station], tangents, yaw_vars, along)
-    weights = np.linalg.inv(seen.covs(totals, yaw_vars))
-    gains = np.linalg.inv(np.add.reduceat(weights, begin[:-1]))[station] @ weights
+    """Directions (k, 3) with their covariances (k, 2, 2) and columns, from what a reading's errors (n, 2, 3) do."""
     back = np.swapaxes(planes_across(now), 1, 2)
-    random = seen.covs(covs, yaw_variances(tangents, covs)[0])
-    own = back @ np.add.reduceat(gains @ random @ np.swapaxes(gains, 1, 2), begin[:-1]) @ np.swapaxes(back, 1, 2)
-    acted = np.swapaxes(seen.axes, 1, 2) @ gains @ seen.turned  # of a reading's error on the direction
+    own = back @ covs @ np.swapaxes(back, 1, 2)
     found = []
     for k, (a, b) in enumerate(zip(begin[:-1].tolist(), begin[1:].tolist(), strict=True)):
-        width = max(one.width for one in packed[a:b])
-        columns = np.zeros((3, width))
-        for matrix, one in zip(acted[a:b], packed[a:b], strict=True):
+        columns = np.zeros((3, max(one.width for one in packed[a:b])))
+        for matrix, one in zip(back[k] @ acted[a:b], packed[a:b], strict=True):
             columns[:, one.places] += matrix @ one.values
         shared = Packed(columns)
         total = own[k] + shared.values @ shared.values.T
-        left, _ = yaw_variances(now[k : k + 1], total[None])
-        found.append(SphereDirection(now[k].copy(), own[k].copy(), shared, bows_of(now[k : k + 1], left)[0]))
+        left = yaw_variances(now[k : k + 1], total[None])
+        bow = bows_of(now[k : k + 1], left)[0]
+        found.append(SphereDirection(now[k].copy(), own[k].copy(), shared, (float(left[0]), 0.0), bow))
     return found
 
 
-def off_direction(
-    tangents: Array, covs: Array, shared: Array, others: Array, other_covs: Array, other_shared: Array
-) -> tuple[Array, Array]:
+@dataclass(frozen=True, slots=True)
+class Directions:
+    """Directions side by side: (n, 3), random covariances (n, 3, 3), columns (n, 3, s), and (n,) of yaws, rad^2."""
+
+    tangents: Array
+    covs: Array
+    shared: Array
+    yaw_vars: Array
+
+    @property
+    def along(self) -> Array:
+        """Variances (n,) of the inclinations."""
+        totals = self.covs + self.shared @ np.swapaxes(self.shared, 1, 2)
+        return polar_variances(self.tangents, totals)[0]
+
+
+def off_direction(directions: Directions, others: Directions) -> tuple[Array, Array]:
     """By how much (n, 2) other directions are off some, and the covariance (n, 2, 2) of that, across the latter.
 
-    What both share, columns (n, 3, s) alike, cancels.
+    What both share, the same columns, cancels.
     """
-    mine, its = (
-        yaw_variances(at, own + columns @ np.swapaxes(columns, 1, 2))
-        for at, own, columns in ((tangents, covs, shared), (others, other_covs, other_shared))
-    )
-    yaw_vars, along = (one + other for one, other in zip(mine, its, strict=True))
-    between = _Seen(tangents, others, yaw_vars, along)
-    apart = between.turned @ other_shared - between.axes @ shared
-    random = between.turned @ other_covs @ np.swapaxes(between.turned, 1, 2)
-    random += between.axes @ covs @ np.swapaxes(between.axes, 1, 2)
+    yaw_vars, along = directions.yaw_vars + others.yaw_vars, directions.along + others.along
+    between = _Seen(directions.tangents, others.tangents, yaw_vars, along)
+    apart = between.turned @ others.shared - between.axes @ directions.shared
+    random = between.turned @ others.covs @ np.swapaxes(between.turned, 1, 2)
+    random += between.axes @ directions.covs @ np.swapaxes(between.axes, 1, 2)
     return between.apart, random + apart @ np.swapaxes(apart, 1, 2)

@@ -71,5 +71,5 @@ def with_trusts(resolved: Resolved, trusts: Sequence[int]) -> Resolved:
 
 def with_yaws_of(resolved: Resolved, yaw_vars: Array | float) -> Resolved:
     """Stops whose yaws are not known by these variances more, rad^2."""
-    turned = resolved.by_yaw[..., :, None] * resolved.by_yaw[..., None, :]
-    return replace(resolved, cov=resolved.cov + np.asarray(yaw_vars)[..., None, None] * turned)
+    turned, more = resolved.by_yaw[..., :, None] * resolved.by_yaw[..., None, :], np.asarray(yaw_vars)
+    return replace(resolved, cov=resolved.cov + more[..., None, None] * turned, yaw_var=resolved.yaw_var + more)

@@ -57,7 +57,8 @@ def figures(seed: int, inclination_deg: float, yaw_stds_deg: list[float], runs: 
     tangents, covs = drawn(seed, inclination, DEG * np.array(yaw_stds_deg), runs)
     count = len(yaw_stds_deg)
     begin = np.arange(0, runs * count + 1, count)
-    found = fuse_on_sphere(tangents.reshape(-1, 3), covs.reshape(-1, 3, 3), [NOTHING] * (runs * count), begin)
+    yaws = np.stack([np.tile((DEG * np.array(yaw_stds_deg)) ** 2, runs), np.zeros(runs * count)], axis=1)
+    found = fuse_on_sphere(tangents.reshape(-1, 3), covs.reshape(-1, 3, 3), [NOTHING] * (runs * count), yaws, begin)
     errors, claimed = errors_of(found, inclination)
     nees = float(np.mean(np.einsum("ni,nij,nj->n", errors, np.linalg.inv(claimed), errors))) / 2.0
     best = int(np.argmin(yaw_stds_deg))
@@ -106,7 +107,10 @@ def test_a_joint_that_readings_share_stays_whole_in_the_azimuth_and_out_of_the_i
 ) -> None:
     tangents, covs = drawn(3, inclination_deg * DEG, np.full(4, 1e-4), 1)
     turned = 3.0 * DEG * np.array([[-t[1], t[0], 0.0] for t in tangents[0]])
-    readings = [SphereDirection(t, c, Packed(s[:, None])) for t, c, s in zip(tangents[0], covs[0], turned, strict=True)]
+    readings = [
+        SphereDirection(t, c, Packed(s[:, None]), (1e-8, (3.0 * DEG) ** 2))
+        for t, c, s in zip(tangents[0], covs[0], turned, strict=True)
+    ]
     fused = fuse_by_bayes(readings)
     ((inclination_std, azimuth_std),) = stds_of_directions([fused])
     noise = 0.5 * NOISE / G
@@ -119,12 +123,13 @@ def test_one_reading_is_the_direction_and_stations_side_by_side_are_each_alone(i
     tangents, covs = drawn(4, inclination_deg * DEG, np.array([0.02, 0.3, 0.01]), 5)
     begin = np.array([0, 1, 4, 9, 15])
     flat = tangents.reshape(-1, 3), covs.reshape(-1, 3, 3)
-    together = fuse_on_sphere(*flat, [NOTHING] * 15, begin)
+    yaws = np.tile([[0.02**2, 0.0], [0.3**2, 0.0], [0.01**2, 0.0]], (5, 1))
+    together = fuse_on_sphere(*flat, [NOTHING] * 15, yaws, begin)
     np.testing.assert_allclose(together[0].tangent, flat[0][0], atol=1e-14)
     np.testing.assert_allclose(together[0].own, flat[1][0], atol=1e-8 * float(np.trace(flat[1][0])))
     for k, one in enumerate(together):
         some, count = slice(begin[k], begin[k + 1]), int(begin[k + 1] - begin[k])
-        (alone,) = fuse_on_sphere(flat[0][some], flat[1][some], [NOTHING] * count, np.array([0, count]))
+        (alone,) = fuse_on_sphere(flat[0][some], flat[1][some], [NOTHING] * count, yaws[some], np.array([0, count]))
         for name in ("tangent", "own", "bow"):
             np.testing.assert_array_equal(getattr(one, name), getattr(alone, name))
 
@@ -134,7 +139,7 @@ def test_one_reading_is_the_direction_and_stations_side_by_side_are_each_alone(i
 def test_honest_readings_depart_as_often_as_chance_has_it(inclination_deg: float, yaw_deg: float) -> None:
     tangents, covs = drawn(5, inclination_deg * DEG, np.full(3, yaw_deg * DEG), 600)
     squares = [
-        newest_departure([bare_direction(*one) for one in zip(*run, strict=True)])[1] ** 2
+        newest_departure([bare_direction(*one, (yaw_deg * DEG) ** 2) for one in zip(*run, strict=True)])[1] ** 2
         for run in zip(tangents, covs, strict=True)
     ]
     assert np.mean(squares) == pytest.approx(2.0, rel=0.12)  # chi-square of two; its mean is known to 4 %
@@ -142,10 +147,12 @@ def test_honest_readings_depart_as_often_as_chance_has_it(inclination_deg: float
 
 def test_a_reading_that_is_off_in_inclination_departs_however_poor_its_yaw_is() -> None:
     tangents, covs = drawn(6, 60.0 * DEG, np.full(4, 20.0 * DEG), 1)
-    readings = [bare_direction(*one) for one in zip(tangents[0], covs[0], strict=True)]
+    readings = [bare_direction(*one, (20.0 * DEG) ** 2) for one in zip(tangents[0], covs[0], strict=True)]
     inclination, azimuth = direction_angles(readings[-1].lean, readings[-1].down)
     off, s = inclination + 10.0 * NOISE / G, math.sin(inclination + 10.0 * NOISE / G)
-    wrong = bare_direction(np.array([s * math.cos(azimuth), s * math.sin(azimuth), math.cos(off)]), covs[0, -1])
+    wrong = bare_direction(
+        np.array([s * math.cos(azimuth), s * math.sin(azimuth), math.cos(off)]), covs[0, -1], (20.0 * DEG) ** 2
+    )
     earlier = fuse_by_bayes(readings[:-1])
     assert departure_from(earlier, readings[-1])[1] < 3.5
     assert departure_from(earlier, wrong)[1] > 6.0
