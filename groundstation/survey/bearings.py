@@ -29,7 +29,10 @@ def planes_across(tangents: Array) -> Array:
     They are high side and right turned back by the azimuth, so that they stay as they are where a plan passes the
     vertical. Straight up they are north and east again, and turn with the azimuth all about it.
     """
-    x, y, z = np.moveaxis(tangents, -1, 0)
-    apart = np.maximum(1.0 + z, UPWARD)
-    first = np.stack([1.0 - x * x / apart, -x * y / apart, -x], axis=-1)
-    return np.stack([first, np.stack([-x * y / apart, 1.0 - y * y / apart, -y], axis=-1)], axis=-2)
+    x, y = tangents[..., 0], tangents[..., 1]
+    apart = np.maximum(1.0 + tangents[..., 2], UPWARD)
+    found = np.empty((*tangents.shape[:-1], 2, 3))
+    found[..., 0, 0], found[..., 1, 1] = 1.0 - x * x / apart, 1.0 - y * y / apart
+    found[..., 0, 1] = found[..., 1, 0] = -x * y / apart
+    found[..., 0, 2], found[..., 1, 2] = -x, -y
+    return found

@@ -15,11 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.bearings import planes_across
-from groundstation.survey.fusion.fusion import Stack
 from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Quality
 from groundstation.survey.fusion.shared import CAUSES, Places, columns_of
 from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR, SphereDirection
+from groundstation.survey.fusion.sphere_fusion import Stack
 from groundstation.survey.fusion.survey_trust import Trust
 from telemetry.messages import NodeFlag
 

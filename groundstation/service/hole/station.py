@@ -231,9 +231,13 @@ class SurveyStation:
     @staticmethod
     def fuse_together(stations: Sequence[SurveyStation], table: ResolvedStops) -> None:
         """Fuse the stops that count of several stations, all of which are believed, in one."""
-        ranges = [(one.first, one.count) for one in stations]
-        rows = [row for one, (first, end) in zip(stations, ranges, strict=True) for row in one.stops.rows[first:end]]
-        GrowingBayes.fuse_each([one._all for one in stations], ranges, table.stack(rows))
+        ranges, rows, growing = [], array("I"), []
+        for one in stations:
+            first, end = one.first, len(one.stops.rows)
+            ranges.append((first, end))
+            growing.append(one._all)
+            rows += one.stops.rows[first:end]
+        GrowingBayes.fuse_each(growing, ranges, table.stack(rows))
 
     def known_before(self, place: int) -> SphereDirection | None:
         """What the stops before one came to, where that is known."""

@@ -11,20 +11,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
+from operator import attrgetter
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.fusion.packed import Packed, packed_each
 from groundstation.survey.fusion.resolve import Direction
-from groundstation.survey.fusion.sphere_direction import SphereDirection, on_sphere
-from groundstation.survey.fusion.sphere_fusion import Directions, fuse_on_sphere, off_direction
+from groundstation.survey.fusion.sphere_direction import OWN, PACKED, TANGENT, YAW_VARS, SphereDirection, on_sphere
+from groundstation.survey.fusion.sphere_fusion import Stack, fuse_on_sphere, off_direction
 
 Array = npt.NDArray[np.float64]
 # a departure in the plane is beyond this length as often (4.55 %) as one number is beyond two standard deviations
 DEPARTED = math.sqrt(-2.0 * math.log(math.erfc(math.sqrt(2.0))))
+WIDTH = attrgetter("width")
 QUADRATIC_TO = 4.0  # standard deviations up to which the adaptive scheme is quadratic
 
 
@@ -49,32 +51,23 @@ class Weighting(Enum):
 POWERS = {Weighting.EQUAL: 0, Weighting.LINEAR: 1, Weighting.QUADRATIC: 2, Weighting.CUBIC: 3}
 
 
-@dataclass(frozen=True, slots=True)
-class Stack:
-    """Readings side by side, unit vectors with their errors: (n, 3), (n, 3, 3) and (n, 3, s).
-
-    ``yaw_vars`` (n, 2), rad^2, are what of these is of a yaw: random, and shared.
-    """
-
-    tangents: Array
-    covs: Array
-    shared: Array
-    yaw_vars: Array
-
-
 def stack_of(readings: Sequence[Direction]) -> Stack:
     """Return readings stacked along a first axis (n,)."""
-    found = [*map(on_sphere, readings)]
-    tangents, covs = np.array([one.tangent for one in found]), np.array([one.own for one in found])
-    yaw_vars = np.array([one.yaw_vars for one in found])
-    return Stack(tangents, covs, _columns_of(found, max(one.width for one in found)), yaw_vars)
+    return _stacked([*map(on_sphere, readings)])
+
+
+def _stacked(found: Sequence[SphereDirection], width: int = 0) -> Stack:
+    """The same, with as many columns as the widest has, or ``width``."""
+    columns = _columns_of(found, max(width, *map(WIDTH, found)) if len(found) > 1 else max(width, found[0].width))
+    tangents, covs, yaw_vars = (np.array([*map(part, found)]) for part in (TANGENT, OWN, YAW_VARS))
+    return Stack(tangents, covs, columns, yaw_vars)
 
 
 def _columns_of(directions: Sequence[SphereDirection], width: int) -> Array:
     """Columns (n, 3, width) of unit vectors, with zeros for those that one does not know."""
     columns = np.zeros((len(directions), 3, width))
-    for own, one in zip(columns, directions, strict=True):
-        one.packed.fill(own)
+    for own, packed in zip(columns, map(PACKED, directions), strict=True):
+        own[:, packed.places] = packed.values
     return columns
 
 
@@ -148,9 +141,8 @@ def vertical_part(lean: Array, sense: float) -> float:
 def fuse_by_bayes(readings: Sequence[Direction]) -> SphereDirection:
     """Recursive Bayes of at least one reading, see ``sphere_fusion``."""
     found = [*map(on_sphere, readings)]
-    tangents, covs = np.array([one.tangent for one in found]), np.array([one.own for one in found])
-    yaw_vars = np.array([one.yaw_vars for one in found])
-    return fuse_on_sphere(tangents, covs, [one.packed for one in found], yaw_vars, np.array([0, len(found)]))[0]
+    tangents, covs, yaw_vars = (np.array([*map(part, found)]) for part in (TANGENT, OWN, YAW_VARS))
+    return fuse_on_sphere(tangents, covs, [*map(PACKED, found)], yaw_vars, np.array([0, len(found)]))[0]
 
 
 def sequence_weights(count: int, power: int) -> Array:
@@ -198,14 +190,11 @@ def departure_from(earlier: SphereDirection, newest: Direction) -> tuple[Array, 
 
 def departures_from(earlier: Sequence[SphereDirection], newest: Stack) -> list[Departure]:
     """Return ``departure_from`` of several stations, each across its earlier direction: to north and east, tilted."""
-    width = max(newest.shared.shape[2], *(one.width for one in earlier))
-    shared = np.zeros((len(earlier), 3, width))
-    shared[:, :, : newest.shared.shape[2]] = newest.shared
-    before = Directions(
-        np.array([one.tangent for one in earlier]), np.array([one.own for one in earlier]), _columns_of(earlier, width),
-        np.array([sum(one.yaw_vars) for one in earlier]),
-    )  # fmt: skip
-    after = Directions(newest.tangents, newest.covs, shared, newest.yaw_vars.sum(axis=1))
+    before, after = _stacked(earlier, newest.shared.shape[2]), newest
+    if before.shared.shape[2] > newest.shared.shape[2]:
+        shared = np.zeros_like(before.shared)
+        shared[:, :, : newest.shared.shape[2]] = newest.shared
+        after = replace(newest, shared=shared)
     apart, covs = off_direction(before, after)
     squares = apart[:, None] @ np.linalg.solve(covs, apart[:, :, None])
     return [(one, math.sqrt(square)) for one, square in zip(apart, squares[:, 0, 0].tolist(), strict=True)]

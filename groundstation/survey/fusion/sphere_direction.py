@@ -24,7 +24,7 @@ LEVEL = np.eye(3)[:2]  # the lean of a unit vector
 UNKNOWN_YAW_VAR = math.pi**2 / 3.0  # rad^2, uniform on the circle, as nodes say it (``telemetry.messages``)
 AS_A_CIRCLE = 1.5  # of the squared lean, second moment along it of a yaw that may be any
 SURE: Array = np.zeros((3, 3))
-TANGENT = attrgetter("tangent")
+TANGENT, OWN, YAW_VARS, PACKED = map(attrgetter, ("tangent", "own", "yaw_vars", "packed"))
 
 
 class SphereDirection(Direction):
@@ -34,7 +34,8 @@ class SphereDirection(Direction):
     ``yaw_vars`` (rad^2) are what of the covariance, and of the columns, is of a yaw.
     """
 
-    __slots__ = ("bow", "own", "packed", "yaw_vars")
+    __slots__ = ("bow", "own", "packed", "tangent", "yaw_vars")
+    tangent: Array  # (3,), unit vector
     own: Array  # (3, 3), covariance of the unit vector that no other shares
     packed: Packed  # (3, s) of the unit vector
     yaw_vars: tuple[float, float]
@@ -44,7 +45,7 @@ class SphereDirection(Direction):
         self, tangent: Array, own: Array, packed: Packed, yaw_vars: tuple[float, float] = (0.0, 0.0), bow: Array = SURE
     ) -> None:
         named = {"lean": tangent[:2], "down": float(tangent[2]), "cov": own[:2, :2], "own": own, "packed": packed}
-        for name, value in (named | {"yaw_vars": yaw_vars, "bow": bow}).items():
+        for name, value in (named | {"tangent": tangent, "yaw_vars": yaw_vars, "bow": bow}).items():
             object.__setattr__(self, name, value)
 
     @property
@@ -60,11 +61,6 @@ class SphereDirection(Direction):
     def fill(self, columns: Array) -> None:
         """Write the shared columns of the lean into ``columns``, zeros (2, >= s)."""
         columns[:, self.packed.places] = self.packed.values[:2]
-
-    @property
-    def tangent(self) -> Array:
-        """Unit vector (3,)."""
-        return np.array([*self.lean, self.down])
 
     @property
     def tangent_cov(self) -> Array:
@@ -104,11 +100,12 @@ def polar_variances(tangents: Array, covs: Array) -> tuple[Array, Array, Array]:
     """Variances of the inclination and across it, and squared leans (n,), of directions (n, 3) with covariances."""
     x, y, z = tangents.T
     squares = x * x + y * y
-    size = np.sqrt(np.maximum(squares, UPRIGHT**2))
-    down = np.stack([x * z, y * z, -squares], axis=1) / size[:, None]
-    level = np.stack([-y, x, np.zeros_like(x)], axis=1) / size[:, None]
-    along, across = (np.maximum((u[:, None] @ covs @ u[:, :, None])[:, 0, 0], 0.0) for u in (down, level))
-    return along, across, squares
+    axes = np.zeros((len(tangents), 2, 3))  # down along the inclination, and level
+    axes[:, 0, 0], axes[:, 0, 1], axes[:, 0, 2] = x * z, y * z, -squares
+    axes[:, 1, 0], axes[:, 1, 1] = -y, x
+    axes /= np.sqrt(np.maximum(squares, UPRIGHT**2))[:, None, None]
+    found = np.maximum(axes @ covs @ axes.transpose(0, 2, 1), 0.0)
+    return found[:, 0, 0], found[:, 1, 1], squares
 
 
 def stds_of_angles(tangents: Array, covs: Array) -> list[tuple[float, float]]:
@@ -134,9 +131,8 @@ def stds_of_directions(directions: Sequence[Direction]) -> list[tuple[float, flo
 def yaw_variances(tangents: Array, covs: Array) -> Array:
     """What of covariances (n, 3, 3) is of a yaw (n,), rad^2: a force knows both axes across a tube alike."""
     along, across, squares = polar_variances(tangents, covs)
-    known = squares >= UPRIGHT**2
-    found = np.where(known, np.maximum(across - along, 0.0) / np.where(known, squares, 1.0), 0.0)
-    return np.minimum(found, UNKNOWN_YAW_VAR)
+    found = np.maximum(across - along, 0.0) / np.maximum(squares, UPRIGHT**2)
+    return np.minimum(found * (squares >= UPRIGHT**2), UNKNOWN_YAW_VAR)
 
 
 def bows_of(tangents: Array, yaw_vars: Array) -> Array:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 import numpy.typing as npt
@@ -22,8 +23,22 @@ from groundstation.survey.fusion.sphere_direction import SphereDirection, bows_o
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
 STEPS = 30  # at the most
-SETTLED = 1e-24  # of the square of a step in standard deviations
+SETTLED = 1e-16  # of the square of a step in standard deviations
 TINY = 1e-300
+WIDTH = attrgetter("width")
+
+
+@dataclass(frozen=True, slots=True)
+class Stack:
+    """Directions side by side, unit vectors with their errors: (n, 3), (n, 3, 3) and (n, 3, s).
+
+    ``yaw_vars`` (n, 2), rad^2, are what of these is of a yaw: random, and shared.
+    """
+
+    tangents: Array
+    covs: Array
+    shared: Array
+    yaw_vars: Array
 
 
 def fuse_on_sphere(
@@ -51,18 +66,20 @@ def fuse_on_sphere(
     now = _first_directions(tangents, totals, begin)
     moving = np.ones(len(now), np.bool_)
     for _ in range(STEPS):
-        seen = _Seen(now[station], tangents, all_yaws, along, alone)
+        across = planes_across(now)
+        seen = _Seen(now[station], across[station], tangents, all_yaws, along, alone)
         step, information = _solved(seen, seen.covs(totals, all_yaws), begin)
         # a station that has settled stays: what it comes to does not depend on others that have not
-        now = np.where(moving[:, None], _stepped(now, step), now)
-        moving &= np.einsum("ka,kab,kb->k", step, information, step) > SETTLED
+        now = np.where(moving[:, None], _stepped(now, across, step), now)
+        moving &= (step[:, None] @ information @ step[:, :, None])[:, 0, 0] > SETTLED
         if not moving.any():
             break
-    seen = _Seen(now[station], tangents, all_yaws, along, alone)
+    across = planes_across(now)
+    seen = _Seen(now[station], across[station], tangents, all_yaws, along, alone)
     weights = np.linalg.inv(seen.covs(totals, all_yaws))
     gains = np.linalg.inv(np.add.reduceat(weights, begin[:-1]))[station] @ weights
-    random = gains @ seen.covs(covs, yaw_vars[:, 0]) @ np.swapaxes(gains, 1, 2)
-    return _directions(now, np.add.reduceat(random, begin[:-1]), gains @ seen.turned, packed, begin)
+    random = gains @ seen.covs(covs, yaw_vars[:, 0]) @ gains.transpose(0, 2, 1)
+    return _directions(now, across, np.add.reduceat(random, begin[:-1]), gains @ seen.turned, packed, begin)
 
 
 class _Seen:
@@ -70,22 +87,24 @@ class _Seen:
 
     Parameters
     ----------
+    axes : (n, 2, 3) across the directions
     yaw_vars, along : (n,) rad^2, of the yaw of each, and of its inclination
     alone : (n,) rad^2, of the part of the yaw that is of each alone, as far as the direction is that of others
 
     Attributes
     ----------
-    axes : (n, 2, 3) across the directions
-    turned : (n, 2, 3), an error of a reading, turned back, in these
+    turned : (n, 2, 3), an error of a reading, turned back, in the axes
     apart : (n, 2) from the direction to the reading, with the error of its yaw as it is linear
     level : (n, 2) what a rad of yaw moves the direction by
     """
 
-    def __init__(self, now: Array, tangents: Array, yaw_vars: Array, along: Array, alone: Array | float = 0.0) -> None:
+    def __init__(
+        self, now: Array, axes: Array, tangents: Array, yaw_vars: Array, along: Array, alone: Array | float = 0.0
+    ) -> None:
         x, y = now[:, 0], now[:, 1]
         u, v = tangents[:, 0], tangents[:, 1]
         sine, cosine = x * v - y * u, x * u + y * v  # of the angle between the leans, times both
-        error, strength = np.zeros(len(now)), yaw_vars / np.maximum(along, TINY)
+        strength = yaw_vars / np.maximum(along, TINY)
         full = np.arctan2(sine, cosine)
         lever = np.hypot(sine, cosine) * strength
         error = full * lever / (1.0 + lever)
@@ -100,27 +119,23 @@ class _Seen:
         back = np.zeros((len(now), 3, 3))
         back[:, 0, 0] = back[:, 1, 1] = c
         back[:, 0, 1], back[:, 1, 0], back[:, 2, 2] = s, -s, 1.0
-        self.axes = planes_across(now)
-        self.turned = self.axes @ back
-        self.level = (self.axes @ _by_yaw(now)[:, :, None])[:, :, 0]
-        self._there = (self.turned @ _by_yaw(tangents)[:, :, None])[:, :, 0]
+        self.turned = axes @ back
+        x, y, u, v = x[:, None], y[:, None], u[:, None], v[:, None]
+        self.level = axes[:, :, 1] * x - axes[:, :, 0] * y
+        self._there = self.turned[:, :, 1] * u - self.turned[:, :, 0] * v
         seen = (back @ tangents[:, :, None])[:, :, 0]
-        across = (self.axes @ seen[:, :, None])[:, :, 0]
+        across = (axes @ seen[:, :, None])[:, :, 0]
         size = np.sqrt((across**2).sum(axis=1))
         angle = np.arctan2(size, (seen * now).sum(axis=1))
-        across *= np.where(size > 0.0, angle / np.where(size > 0.0, size, 1.0), 1.0)[:, None]
-        outward = (self.axes @ (now * [1.0, 1.0, 0.0])[:, :, None])[:, :, 0]
+        across *= ((angle + TINY) / (size + TINY))[:, None]
+        outward = axes[:, :, 0] * x + axes[:, :, 1] * y
         self.apart = across + error[:, None] * self.level - np.expand_dims(longer, 1) * outward
 
     def covs(self, covs: Array, yaw_vars: Array) -> Array:
         """Covariances (n, 2, 2) of readings: what is of a yaw (rad^2) moves the direction and not what was read."""
-        here, there = (side[:, :, None] * side[:, None] for side in (self.level, self._there))
-        return self.turned @ covs @ np.swapaxes(self.turned, 1, 2) + yaw_vars[:, None, None] * (here - there)
-
-
-def _by_yaw(tangents: Array) -> Array:
-    """Change of directions (n, 3) for one rad of yaw."""
-    return np.stack([-tangents[:, 1], tangents[:, 0], np.zeros(len(tangents))], axis=1)
+        here = self.level[:, :, None] * self.level[:, None]
+        there = self._there[:, :, None] * self._there[:, None]
+        return self.turned @ covs @ self.turned.transpose(0, 2, 1) + yaw_vars[:, None, None] * (here - there)
 
 
 def _first_directions(tangents: Array, totals: Array, begin: Places) -> Array:
@@ -138,23 +153,23 @@ def _solved(seen: _Seen, covs: Array, begin: Places) -> tuple[Array, Array]:
     return np.linalg.solve(information, right[:, :, None])[:, :, 0], information
 
 
-def _stepped(now: Array, step: Array) -> Array:
-    """Directions (k, 3) after steps (k, 2) along great circles."""
+def _stepped(now: Array, across: Array, step: Array) -> Array:
+    """Directions (k, 3) after steps (k, 2) in the axes (k, 2, 3) across them, along great circles."""
     size = np.sqrt((step**2).sum(axis=1))[:, None]
-    toward = (step[:, None] @ planes_across(now))[:, 0] * np.sinc(size / np.pi)
+    toward = (step[:, None] @ across)[:, 0] * np.sinc(size / np.pi)
     moved = np.cos(size) * now + toward
     return np.asarray(moved / np.sqrt((moved**2).sum(axis=1))[:, None])
 
 
 def _directions(
-    now: Array, covs: Array, acted: Array, packed: Sequence[Packed], begin: Places
+    now: Array, across: Array, covs: Array, acted: Array, packed: Sequence[Packed], begin: Places
 ) -> list[SphereDirection]:
     """Directions (k, 3) with their covariances (k, 2, 2) and columns, from what a reading's errors (n, 2, 3) do."""
-    back = np.swapaxes(planes_across(now), 1, 2)
-    own = back @ covs @ np.swapaxes(back, 1, 2)
+    back = across.transpose(0, 2, 1)
+    own = back @ covs @ across
     found = []
     for k, (a, b) in enumerate(zip(begin[:-1].tolist(), begin[1:].tolist(), strict=True)):
-        columns = np.zeros((3, max(one.width for one in packed[a:b])))
+        columns = np.zeros((3, max(map(WIDTH, packed[a:b]))))
         for matrix, one in zip(back[k] @ acted[a:b], packed[a:b], strict=True):
             columns[:, one.places] += matrix @ one.values
         shared = Packed(columns)
@@ -165,30 +180,18 @@ def _directions(
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class Directions:
-    """Directions side by side: (n, 3), random covariances (n, 3, 3), columns (n, 3, s), and (n,) of yaws, rad^2."""
-
-    tangents: Array
-    covs: Array
-    shared: Array
-    yaw_vars: Array
-
-    @property
-    def along(self) -> Array:
-        """Variances (n,) of the inclinations."""
-        totals = self.covs + self.shared @ np.swapaxes(self.shared, 1, 2)
-        return polar_variances(self.tangents, totals)[0]
-
-
-def off_direction(directions: Directions, others: Directions) -> tuple[Array, Array]:
+def off_direction(directions: Stack, others: Stack) -> tuple[Array, Array]:
     """By how much (n, 2) other directions are off some, and the covariance (n, 2, 2) of that, across the latter.
 
     What both share, the same columns, cancels.
     """
-    yaw_vars, along = directions.yaw_vars + others.yaw_vars, directions.along + others.along
-    between = _Seen(directions.tangents, others.tangents, yaw_vars, along)
-    apart = between.turned @ others.shared - between.axes @ directions.shared
-    random = between.turned @ others.covs @ np.swapaxes(between.turned, 1, 2)
-    random += between.axes @ directions.covs @ np.swapaxes(between.axes, 1, 2)
-    return between.apart, random + apart @ np.swapaxes(apart, 1, 2)
+    along = np.zeros(len(directions.tangents))
+    for side in (directions, others):
+        along += polar_variances(side.tangents, side.covs + side.shared @ side.shared.transpose(0, 2, 1))[0]
+    yaw_vars = (directions.yaw_vars + others.yaw_vars).sum(axis=1)
+    axes = planes_across(directions.tangents)
+    between = _Seen(directions.tangents, axes, others.tangents, yaw_vars, along)
+    apart = between.turned @ others.shared - axes @ directions.shared
+    random = between.turned @ others.covs @ between.turned.transpose(0, 2, 1)
+    random += axes @ directions.covs @ axes.transpose(0, 2, 1)
+    return between.apart, random + apart @ apart.transpose(0, 2, 1)
