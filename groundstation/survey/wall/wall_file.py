@@ -11,13 +11,12 @@ import tomllib
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.plan_settings import PlanSettings
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
 from groundstation.survey.wall.as_built import Columns
 from groundstation.survey.wall.closing import ClosingDay, closing_by_day
@@ -34,6 +33,9 @@ from groundstation.survey.wall.wall_tables import STRAIGHT, Defaults, Remedy, re
 from groundstation.survey.well.depth_reference import DEPTHS_FROM
 from groundstation.survey.well.methods import Method
 from groundstation.survey.well.reference_frames import SiteGrid
+
+if TYPE_CHECKING:
+    from groundstation.plan_settings import PlanSettings
 
 Array = npt.NDArray[np.float64]
 LAYOUTS = ("line", "shaft", "grid")

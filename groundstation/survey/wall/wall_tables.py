@@ -9,17 +9,20 @@ import math
 from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.plan_settings import PlanSettings, read_plan
 from groundstation.survey.files.survey_records import read_columns
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
 from groundstation.survey.wall.column_deviation import ColumnDesign, Tolerance, parse_tolerance
 from groundstation.survey.wall.column_plans import ColumnPlan, ColumnStatus
 from groundstation.survey.well.depth_reference import DEPTHS_FROM, DepthReference, depth_reference
+
+if TYPE_CHECKING:
+    from groundstation.plan_settings import PlanSettings
 
 Array = npt.NDArray[np.float64]
 NUMBERS = (
@@ -226,6 +229,8 @@ def read_course(path: Path) -> PlanSettings:
     SurveyError
         Names the file, what was expected and what came.
     """
+    from groundstation.plan_settings import read_plan  # a wall of straight columns needs none of it
+
     found = read_plan(path)
     if any(found.head):
         north, east, down = found.head
