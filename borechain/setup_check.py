@@ -18,12 +18,13 @@ LATER = (VerdictDoubt.NO_SURVEY, VerdictDoubt.UNCERTAIN, VerdictDoubt.SETUP)  # 
 
 @dataclass(frozen=True, slots=True)
 class SetupCheck:
-    """The answer: what is missing by name, what else is wrong, what to do next, and the items of ``ground/setup``."""
+    """The answer: what is missing by name, what else is wrong, what to do next, what no sigma holds, and all items."""
 
     ready: bool
     missing: list[str]
     wrong: list[str]
     todo: str
+    left_out: str
     items: list[dict[str, Any]]
 
     def as_object(self) -> dict[str, Any]:
@@ -85,4 +86,6 @@ def check_settings(settings: dict[str, Any], joints: dict[int, tuple[bool, bool]
 
 def check_of(setup: dict[str, Any], wrong: list[str]) -> SetupCheck:
     """The check by the answer of a ground station, and by what else is wrong."""
-    return SetupCheck(setup["ready"] and not wrong, setup["missing"], wrong, setup["todo"], setup["items"])
+    return SetupCheck(
+        setup["ready"] and not wrong, setup["missing"], wrong, setup["todo"], setup["left_out"], setup["items"]
+    )

@@ -12,6 +12,9 @@ PROGRAM = "python -m groundstation"
 def main() -> None:
     """Run the ground station."""
     try:
+        from telemetry.runtime.one_thread import one_thread_each
+
+        one_thread_each()  # before the library of matrices is loaded
         from groundstation.command import ground
         from telemetry.runtime.command_line import run_command
     except ModuleNotFoundError as error:

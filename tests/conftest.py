@@ -12,7 +12,7 @@ import pytest
 from hypothesis import settings
 from hypothesis.internal.conjecture import providers
 
-from sim.one_thread import one_thread_each
+from telemetry.runtime.one_thread import one_thread_each
 
 # the first example of a property compiles the kernel, which no deadline of an example can foresee; the same commit
 # gives the same examples everywhere, more of them in `make study`, and new ones are looked for by `make explore`

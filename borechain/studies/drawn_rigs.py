@@ -86,7 +86,11 @@ def tables_of(draw: RigDraw) -> Tables:
         "encoder": {"phase": "locked"},
         "disturbance": {"play": {"sigma_deg": known.play_deg}},
         "told": drawn_errors(known, draw.seed),
-        "setup": {"north_std_deg": known.north_deg, "collar_std_deg": known.collar_deg},
+        "setup": {
+            "north_std_deg": known.north_deg,
+            "collar_std_deg": known.collar_deg,
+            "stick_up_std_m": known.depth_offset_m,
+        },
     }
 
 

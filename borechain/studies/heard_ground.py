@@ -74,6 +74,7 @@ def tell_ground(ground: GroundProcess, world: World, run: StringRun) -> None:
         for message in heard.get(cycle, ()):
             ground.on_message(replace(message, epoch=EPOCH), end)
         ground.before_frames()
+    ground.watch.look(clock.rig_now)  # once: after every survey it would have the hole adjusted as often
 
 
 def messages_by_cycle(run: StringRun) -> dict[int, list[Heard]]:

@@ -1,7 +1,6 @@
 """A hole as the ground station knows it beside the truth: errors and what is stated of them, station by station.
 
-A station is where its readings were on the mean: what it says of a depth that was measured wrongly is judged at the
-true one.
+What a station says of a depth that was measured wrongly is judged at the true one.
 """
 
 from __future__ import annotations
@@ -73,9 +72,13 @@ def judge_hole_of(world: World, hole: SurveyedHole) -> JudgedHole:
 
 
 def true_depth(world: World, station: SurveyStation) -> float:
-    """True depth (m) along the hole at which the readings of a station were made, on the mean."""
-    tubes, times = station.stops.column("tube").tolist(), station.stops.column("at").tolist()
-    return float(np.mean([world.bit_depth(at) - world.below(tube) for tube, at in zip(tubes, times, strict=True)]))
+    """True depth (m) along the hole at which a station is: as told, less what its readings were told off on the mean.
+
+    It has the depth of its first reading; those of later tubes were told some millimetres off that one.
+    """
+    tubes, times, told = (station.stops.column(name).tolist() for name in ("tube", "at", "md"))
+    true = [world.bit_depth(at) - world.below(tube) for tube, at in zip(tubes, times, strict=True)]
+    return station.md - float(np.mean(np.subtract(told, true)))
 
 
 def quadratic_forms(error: Array, cov: Array) -> Array:

@@ -40,12 +40,14 @@ BLUNDERS: Columns = (
     ("named", "named rightly"),
     ("doubted", "told as a doubt"),
     ("below", "below 3 sigma"),
+    ("unseen", "beyond, in no reading"),
     ("missed", "beyond, without a word"),
     ("beyond_on_target", "beyond and ON TARGET"),
     ("worst_sigmas", "worst error, sigma"),
     ("direction_sigmas", "of a direction"),
     ("toe_mm", "toe, mm"),
     ("causes", "named"),
+    ("seen_by", "seen by alone"),
 )
 RIG_STUDIES: Final = by_name(
     "studies",

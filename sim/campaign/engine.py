@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 from sim.campaign.campaign_folder import code_digest
 from sim.campaign.chunk import Chunk, run_chunk
 from sim.errors import RigError
-from sim.one_thread import one_thread_each
 from sim.studies.pool import usable_cores
+from telemetry.runtime.one_thread import one_thread_each
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -51,6 +51,7 @@ def told_settings(world: World) -> dict[str, Any]:
             "collar_azimuth_deg": math.degrees(azimuth),
             "collar_std_deg": told.collar_std_deg,
         },
+        "stick-up": {"stick_up_std_m": told.stick_up_std_m},
         "mounts": {"mount_tilt_std_deg": max(world.scenario.file.joints.mount_tilt_std_deg, EXACTLY_DEG)},
     }
     return {key: value for name, told_ in by_name.items() if name not in told.untold for key, value in told_.items()}

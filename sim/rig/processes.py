@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from multiprocessing.context import ForkServerProcess
 from typing import Any
 
-from sim.one_thread import one_thread_each
+from telemetry.runtime.one_thread import one_thread_each
 
 STOP_SCHEDULE = ((signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0))  # signal, wall seconds until the next
 RESTART_LIMIT = 5  # deaths of a process that are answered with a new start within ...

@@ -123,6 +123,7 @@ UNUSED: Final[dict[str, str]] = {  # keys without effect on a campaign, and why
     "design.radius_m": GROUND,
     "design.tolerance": GROUND,
     "setup.north_std_deg": GROUND,
+    "setup.stick_up_std_m": GROUND,
     "setup.collar_std_deg": GROUND,
     "told.collar_north_deg": GROUND,
     "told.collar_east_deg": GROUND,

@@ -12,7 +12,7 @@ from multiprocessing.pool import Pool
 from typing import Protocol, TypeVar
 
 from sim.errors import RigError
-from sim.one_thread import one_thread_each
+from telemetry.runtime.one_thread import one_thread_each
 
 Job = TypeVar("Job")
 Found = TypeVar("Found")

@@ -84,11 +84,12 @@ class JointSection(ScenarioSection):
 class SetupSection(ScenarioSection):
     """What the crew tells of the rig, each with the standard error that it states."""
 
-    untold: tuple[Literal["north", "collar", "joints", "mounts"], ...] = Field(
-        (), description="what the crew does not tell, of north, collar, joints and mounts"
+    untold: tuple[Literal["north", "collar", "joints", "mounts", "stick-up"], ...] = Field(
+        (), description="what the crew does not tell, of north, collar, joints, mounts and stick-up"
     )
     north_std_deg: Positive = Field(EXACTLY_DEG, description="stated of the encoder's zero against north")
     collar_std_deg: Positive = Field(EXACTLY_DEG, description="stated of the direction at the collar, each way")
+    stick_up_std_m: Positive = Field(0.01, description="stated of the stick-up, read by hand with a rule")
 
 
 class TorsionSection(ScenarioSection):

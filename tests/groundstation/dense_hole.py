@@ -85,9 +85,10 @@ class DenseHole:
         info = np.zeros((self.width, self.width))
         basis = self.found.linear.bases[0]
         info[:2, :2] = np.linalg.inv(basis @ path.collar_cov @ basis.T + 1e-16 * np.eye(2))
-        info[2:4, 2:4] = np.eye(2) / path.curvature_std**2
+        info[2:4, 2:4] = np.eye(2) / self.found.now.curvature_var
         for k, length in enumerate(np.diff(self.md)):
-            go, spread = walk(length, path.correlation_length, path.curvature_std)
+            std = self.found.now.leg_vars[min(k, len(self.found.now.leg_vars) - 1)] ** 0.5
+            go, spread = walk(length, path.correlation_length, std)
             for axis in range(2):
                 row = np.zeros((2, self.width))
                 after, before = [4 * k + 4 + axis, 4 * k + 6 + axis], [4 * k + axis, 4 * k + 2 + axis]

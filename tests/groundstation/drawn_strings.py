@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from groundstation.survey.adjustment.looks import Looks, PathPrior, StringPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops, chain_causes
@@ -151,4 +152,4 @@ def read_force(d: Array, psi: float, tilt: Array, gravity: float) -> Array:
     """Force (3,) that a tube along d, turned by psi about it and tilted, reads without noise."""
     c, s = math.cos(psi), math.sin(psi)
     m = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, -1.0]]) @ d
-    return np.asarray(gravity * (m + np.cross([tilt[0], tilt[1], 0.0], m)))
+    return np.asarray(gravity * Rotation.from_rotvec([tilt[0], tilt[1], 0.0]).apply(m))

@@ -8,16 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hand_fed import Rig
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from schemas import check_answers, shown_on
-from test_model import Placed, inclination_deg, knowing, passes, survey
+from string_passes import Placed, inclination_deg, knowing, passes, survey
 from test_surveyed_biases import MILLI_G, STOPS, Drilled
 
 from groundstation.config import GroundConfig
-from groundstation.service.alarms.verdict import VerdictDoubt
+from groundstation.service.alarms.verdict import VerdictDoubt, Word, judge_hole
 from groundstation.service.alarms.verdict_doubts import known_of
 from groundstation.service.answers.model import RigModel
+from groundstation.service.hole.examined_hole import UNSOLVED
 from groundstation.survey.adjustment.tube_biases import bias_of_tube
 from groundstation.survey.fusion.fusion import Weighting
 
@@ -118,9 +120,9 @@ def test_an_answer_of_nothing_is_empty(tmp_path: Path) -> None:
 
 
 def test_stations_that_are_fused_one_by_one_are_adjusted_beside(tmp_path: Path) -> None:
-    """By default stations are fused one by one; what the tubes say about each other can be asked for all the same."""
+    """Where stations are fused one by one, what the tubes say about each other can be asked for all the same."""
     measurements: list[Placed] = passes(4, lambda _stop, _station: 1.0)
-    model = knowing(tmp_path, measurements, 4)
+    model = knowing(tmp_path, measurements, 4, weighting="bayes")
     assert not model.hole.is_adjusted
     assert shown_on(model, "adjustment")["surveys"] == len(measurements)
 
@@ -135,6 +137,39 @@ def test_what_may_be_one_thing_or_another_makes_the_verdict_unknown(tmp_path: Pa
     ]
     assert (VerdictDoubt.CONTRADICTION in doubts) == bool(model.hole.examined.doubts)
     assert blamed(model)
+
+
+@pytest.mark.parametrize("curvature", [1e-200, 1e-100])
+@pytest.mark.parametrize("asked_before", [False, True])
+def test_surveys_without_a_solution_stand_for_themselves_and_it_is_said(
+    tmp_path: Path, curvature: float, *, asked_before: bool
+) -> None:
+    """No curvature at all is allowed, so the path has no equations: directions are those of each station alone."""
+    measurements = passes(5, lambda _stop, station: 1.0 + 0.1 * station)
+    stiff = {"curvature_std_deg_per_m": curvature}
+    alone = knowing(tmp_path, measurements, 5, weighting=Weighting.BAYES)
+    stuck = knowing(tmp_path, measurements, 5, **ADJUSTED, **stiff)
+    if asked_before:
+        assert "adjustment" in check_answers(stuck)
+    for station in range(5):
+        assert inclination_deg(stuck, station) == inclination_deg(alone, station)
+    assert shown_on(stuck, "adjustment")["surveys"] == 0
+    known = known_of(stuck.config, stuck.string, stuck.setup, stuck.hole, stuck.rig_alarms)
+    assert (VerdictDoubt.CONTRADICTION, UNSOLVED) in known.doubts
+    assert judge_hole(known).word is Word.DONT_KNOW
+
+
+def test_it_is_an_alarm_that_surveys_have_no_solution_until_they_have(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, curvature_std_deg_per_m=1e-200, **ADJUSTED)
+    rig.run(5.0)
+    rig.drill(1, 0.3)
+    rig.drill(2, 0.3)
+    said = [row["detail"] for row in rig.ask("alarms")["rig"] if row["code"] == "blunder"]
+    assert len(said) == 1
+    assert UNSOLVED in said[0]
+    assert UNSOLVED in rig.ask("verdict")["why"]
+    assert rig.ask("verdict")["verdict"] == "dont_know"
+    rig.ground.close()
 
 
 def test_a_north_that_was_not_told_is_in_every_azimuth_and_in_no_inclination(tmp_path: Path) -> None:

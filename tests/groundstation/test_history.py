@@ -1,6 +1,10 @@
 """The history of a hole: a moment a stop, the same after a restart, bounded, thinned without losing its peaks."""
 
+import sqlite3
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,8 +14,9 @@ from hypothesis import strategies as st
 
 from groundstation.errors import SelectorError
 from groundstation.service.answers.thinning import largest_triangles
-from groundstation.service.hole.history import KEPT, History
-from groundstation.service.hole.packed_end import packed_end
+from groundstation.service.disk.moment_record import DamagedMomentError, moment_of_bytes, moment_to_bytes
+from groundstation.service.hole.history import KEPT, History, Moment
+from groundstation.service.hole.packed_end import PackedEnd, packed_end
 from groundstation.survey.wall.column_deviation import Deviations
 
 STOPS = (0.3, 0.3, 0.3, 1.0, 1.9)  # deg
@@ -44,6 +49,139 @@ def test_each_stop_leaves_what_was_known_at_its_end_also_after_a_restart(tmp_pat
         again.ask("history", points="2")
     assert [m["moment"] for m in again.ask("history", points="3")["moments"]][0::2] == [1, 4]
     again.ground.close()
+
+
+ADJUSTED = {"target": 20.0, "weighting": "adjusted"}
+
+
+def drilled_with(folder: Path, stops: int, **settings: Any) -> Rig:
+    rig = Rig(folder, **settings)
+    rig.run(5.0)
+    for stop in range(1, stops + 1):
+        rig.drill(stop, 0.3 + 0.1 * stop)
+    rig.run(2.0)
+    return rig
+
+
+def shown_moments(rig: Rig) -> list[Any]:
+    moments = rig.ask("history")["moments"]
+    numbers = [str(moment["moment"]) for moment in moments]
+    columns = [rig.ask("column", moment=number) for number in numbers]
+    return [moments, *([column["stations"], column["ahead"], column["projection"]] for column in columns)]
+
+
+def standing_levels(rig: Rig) -> list[Any]:
+    return [(row["kind"], row["level_percent"]) for row in rig.ask("alarms")["active"]]
+
+
+def changed_database(folder: Path, *statements: str) -> None:
+    with closing(sqlite3.connect(folder / "ground.sqlite")) as database, database:
+        for statement in statements:
+            database.execute(statement)
+
+
+def test_what_was_known_of_an_adjusted_hole_is_kept_and_not_worked_out_again(tmp_path: Path) -> None:
+    """A moment whose kept bytes say something else says it after a restart too: it comes from the disk."""
+    rig = drilled_with(tmp_path, 5, **ADJUSTED)
+    before, levels = shown_moments(rig), standing_levels(rig)
+    assert [moment["moment"] for moment in before[0]] == [1, 2, 3, 4]
+    rig.ground.close()
+    again = Rig(tmp_path, **ADJUSTED)
+    assert shown_moments(again) == before
+    assert standing_levels(again) == levels
+    again.ground.close()
+    with closing(sqlite3.connect(tmp_path / "ground.sqlite")) as database, database:
+        (content,) = database.execute("select content from moments where number = 3").fetchone()
+        kept = moment_of_bytes(3, content)
+        moved = moment_to_bytes(replace(kept, found=2.0 * kept.found))
+        database.execute("update moments set content = ? where number = 3", (moved,))
+    other = Rig(tmp_path, **ADJUSTED)
+    now, then = (shown[3][0][2]["deviation_cm"] for shown in (shown_moments(other), before))
+    assert now == pytest.approx(2.0 * then, rel=1e-6)
+    assert shown_moments(other)[4] == before[4]
+    other.ground.close()
+
+
+@pytest.mark.parametrize(
+    "statements",
+    [
+        ["drop table moments", "update meta set value = '4' where name = 'schema'"],
+        ["update moments set content = x'00'"],
+        ["update moments set content = x''"],
+        ["update moments set content = cast(content || x'00' as blob)"],
+        ["delete from moments where number > 2"],
+    ],
+)
+def test_a_database_without_moments_or_with_damaged_ones_makes_them_anew(tmp_path: Path, statements: list[str]) -> None:
+    rig = drilled_with(tmp_path, 5, **ADJUSTED)
+    before = shown_moments(rig)
+    rig.ground.close()
+    changed_database(tmp_path, *statements)
+    for _ in range(2):
+        again = Rig(tmp_path, **ADJUSTED)
+        assert shown_moments(again) == before
+        assert "database" not in again.alarms()
+        again.ground.close()
+
+
+def test_what_rests_on_another_setup_is_made_anew(tmp_path: Path) -> None:
+    rig = drilled_with(tmp_path, 5, **ADJUSTED)
+    before = shown_moments(rig)
+    rig.ground.close()
+    other = Rig(tmp_path, **ADJUSTED, collar_inclination_deg=2.0, collar_std_deg=0.01)
+    told = shown_moments(other)
+    other.ground.close()
+    assert [moment["moment"] for moment in told[0]] == [moment["moment"] for moment in before[0]]
+    assert told[0][0]["deviation_cm"] > 1.5 * before[0][0]["deviation_cm"]
+    again = Rig(tmp_path, **ADJUSTED)
+    assert shown_moments(again) == before
+    again.ground.close()
+
+
+def test_of_a_long_hole_that_is_made_anew_fewer_and_fewer_stops_are_worked_out() -> None:
+    history, worked_out = History(), []
+    for stop in range(1, 1001):
+        if history.is_worth(10 * stop):
+            worked_out.append(stop)
+        history.pass_over()
+    assert worked_out[:60] == list(range(1, 61))
+    assert 60 < len(worked_out) < 90
+    assert worked_out[-1] > 750
+    assert 10 * sum(worked_out) < 80_000
+
+
+@given(st.integers(1, 40), st.integers(-1, 6), st.floats(-1e9, 1e9), st.integers(0, 2**32 - 1), st.data())
+def test_a_moment_comes_back_from_its_bytes_and_from_no_others(
+    stations: int, parts: int, at: float, seed: int, data: st.DataObject
+) -> None:
+    lot = np.random.default_rng(seed)
+    end = None
+    if parts >= 0:
+        end = PackedEnd(lot.normal(size=13), lot.normal(size=(parts, 6)).astype(np.float32))
+    moment = Moment(7, at, lot.normal(size=(stations, 2)), lot.normal(size=(stations, 6)).astype(np.float32), end)
+    content = moment_to_bytes(moment)
+    again = moment_of_bytes(7, content)
+    assert (again.number, again.at) == (7, at)
+    assert np.array_equal(again.where, moment.where)
+    assert np.array_equal(again.found, moment.found)
+    assert (again.end is None) == (end is None)
+    if end is not None and again.end is not None:
+        assert np.array_equal(again.end.numbers, end.numbers)
+        assert np.array_equal(again.end.parts, end.parts)
+    cut = data.draw(st.integers(0, len(content) - 1))
+    with pytest.raises(DamagedMomentError):
+        moment_of_bytes(7, content[:cut])
+
+
+def test_the_worst_station_of_a_moment_is_that_of_all_its_rows() -> None:
+    lot = np.random.default_rng(5)
+    for _ in range(100):
+        count = int(lot.integers(1, 9))
+        where = np.stack([np.arange(count), lot.uniform(0.01, 0.1, count)], axis=1)
+        moment = Moment(1, 0.0, where, lot.normal(size=(count, 6)).astype(np.float32), None)
+        assert moment.worst().md == max(moment.rows, key=lambda row: row.ratio).md
+        if count > 1:
+            assert moment.worst(first=1).md == max(moment.rows[1:], key=lambda row: row.ratio).md
 
 
 def test_what_follows_from_a_survey_is_published_at_the_next_look(tmp_path: Path) -> None:

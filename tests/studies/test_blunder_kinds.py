@@ -4,7 +4,7 @@ import pytest
 
 from borechain.studies.blunders.answer_given import AnswerGiven
 from borechain.studies.blunders.kinds import KINDS, PlantedBlunder
-from borechain.studies.blunders.run import BlunderJob, BlunderRun, outcome_of, tables_with
+from borechain.studies.blunders.run import BlunderJob, BlunderRun, outcome_of, run_rig, tables_with
 from borechain.studies.drawn_rigs import KnownSetUp, drawn_rigs, tables_of
 from sim.world.path_section import HOLE_KINDS
 from sim.world.scenario import scenario_of
@@ -47,3 +47,21 @@ def test_rigs_are_drawn_by_their_number_and_have_every_kind_of_hole() -> None:
 )
 def test_an_outcome_is_what_the_crew_is_told(worst: float, answer: AnswerGiven, outcome: str) -> None:
     assert outcome_of(BlunderRun(worst, 1.0, 1.0, answer), ("mount",)) == outcome
+
+
+def test_what_is_in_no_reading_is_counted_by_itself_where_nothing_was_said() -> None:
+    seen_by = "a second bearing"
+    assert outcome_of(BlunderRun(9.0, 1.0, 1.0, HONEST), (), seen_by) == "unseen"
+    assert outcome_of(BlunderRun(2.0, 1.0, 1.0, HONEST), (), seen_by) == "below"
+    assert outcome_of(BlunderRun(9.0, 1.0, 1.0, AnswerGiven("out", (), ("depth",), ())), (), seen_by) == "doubted"
+
+
+@pytest.mark.slow
+def test_a_depth_that_stood_still_is_a_doubt_and_a_wrong_collar_is_named() -> None:
+    draw = drawn_rigs(KnownSetUp(), 1)[0]
+    places = {kind.name: place for place, kind in enumerate(KINDS)}
+    stuck = run_rig(BlunderJob(draw, places["depth stuck"], 0)).answer
+    assert stuck.word == "dont_know"
+    assert "depth_contradicts" in stuck.alarms
+    collar = run_rig(BlunderJob(draw, places["collar wrong"], 1)).answer
+    assert collar.causes == ("collar_wrong",)

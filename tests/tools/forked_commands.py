@@ -24,7 +24,7 @@ import traceback
 from pathlib import Path
 from typing import IO, Any
 
-from sim.one_thread import one_thread_each
+from telemetry.runtime.one_thread import one_thread_each
 
 LAZY = ("matplotlib.pyplot", "scipy.optimize", "scipy.stats", "scipy.signal", "scipy.spatial")  # inside commands
 WARM = "borechain.drilling.preload"

@@ -87,7 +87,7 @@ def check(request: CheckRequest, as_json: bool) -> None:
 
 
 def check_text(found: SetupCheck) -> str:
-    """The answer for people: the word, what is missing, what is wrong, what costs most, and what to do next."""
+    """The answer for people: the word, what is missing, wrong, or costs most, what to do next, what no sigma holds."""
     lines = ["READY TO DRILL" if found.ready else "NOT READY TO DRILL"]
     lines += [f"missing  {name}" for name in found.missing]
     lines += [f"wrong    {why}" for why in found.wrong]
@@ -96,7 +96,7 @@ def check_text(found: SetupCheck) -> str:
         if not row["told"] and not row["missing"] and row["toe_cm"] >= LEAST_CM:
             assumed.setdefault(row["kind"], []).append(row)
     lines += [f"assumed  {assumed_text(rows)}" for rows in assumed.values()]
-    return "\n".join([*lines, f"next     {found.todo}"])
+    return "\n".join([*lines, f"next     {found.todo}", f"no sigma {found.left_out}"])
 
 
 def assumed_text(rows: list[dict[str, Any]]) -> str:

@@ -8,7 +8,8 @@ from typing import Any, Final
 
 from groundstation.service.process.ground_process import GroundProcess
 
-USUAL_ALARMS: Final = frozenset({"deviation", "projection", "depth_silent", "tube_silent"})  # of a rig that is left
+# of a rig that is left, and of a topmost node that is at the collar's edge
+USUAL_ALARMS: Final = frozenset({"deviation", "projection", "depth_silent", "tube_silent", "survey_missing"})
 AT_THE_START: Final = (("reference", "tubes 1 at"), ("tube_sensor", "yaw_untrusted"))  # before a tube has its first yaw
 
 

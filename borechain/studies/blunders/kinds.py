@@ -1,5 +1,9 @@
 """Kinds of blunders, each in three sizes: what becomes of the scenario of a rig, and by which name it is to be found.
 
+What was told once of north, of the stick-up and of lengths is in no reading, or hardly: all are the same, or are moved
+alike, whatever is so. Of such a kind the smallest size is one that its stated sigma makes plausible; the others
+are not, and stand in the table as what no reading can show, with the check beside the readings that would.
+
 The middle of the schedule is when the fifth tube has been drilled; what steps or slips does so then, in a tube that
 passes half of the stations afterwards.
 """
@@ -15,6 +19,7 @@ from groundstation.survey.adjustment.hypotheses import BlunderKind
 from sim.studies.scenarios import Tables
 
 MIDDLE_S: Final = 640.0  # after the start
+LAST_S: Final = 1070.0  # likewise, while the last tube is drilled in
 TUBE: Final = 4  # that something happens to; it is in the string at that time, and not at the bit
 Change = Callable[[Tables, float], Tables]
 
@@ -29,6 +34,7 @@ class PlantedBlunder:
     sizes : three, the smallest first
     change : the scenario of a rig with it
     named : what the adjustment may call it, see ``groundstation.survey.adjustment``
+    seen_by : the check by which alone it is seen, where it is in no reading
     """
 
     name: str
@@ -36,6 +42,7 @@ class PlantedBlunder:
     sizes: tuple[float, float, float]
     change: Change
     named: tuple[str, ...] = ()
+    seen_by: str = ""
 
 
 def of_disturbance(name: str, keys: Callable[[float], dict[str, Any]]) -> Change:
@@ -112,7 +119,8 @@ KINDS: Final[tuple[PlantedBlunder, ...]] = (
     ),
     PlantedBlunder(
         "accelerometer of the bit steps at the last stop", "mg", (0.3, 3.0, 30.0),
-        of_disturbance("force-step", lambda mg: {"tube": 1, "after_s": 1450.0, "step_mg": (mg, mg, 0.0)}), BIAS,
+        of_disturbance("force-step", lambda mg: {"tube": 1, "after_s": LAST_S, "step_mg": (mg, mg, 0.0)}), BIAS,
+        seen_by="the next stop",
     ),
     PlantedBlunder(
         "accelerometer creeps", "mg/s", (0.001, 0.01, 0.3),
@@ -161,23 +169,31 @@ KINDS: Final[tuple[PlantedBlunder, ...]] = (
         "joints untold", "", (0.0, 1.0, 2.0),
         of_section("setup", lambda _: {"untold": ("joints",)}), JOINT,
     ),
-    PlantedBlunder("north wrong", "deg", (1.0, 5.0, 90.0), of_told(lambda deg: {"north_deg": deg}), JOINT),
+    PlantedBlunder(
+        "north wrong", "deg", (0.2, 1.0, 90.0), of_told(lambda deg: {"north_deg": deg}),
+        (K.COLLAR_WRONG,), seen_by="a second bearing",
+    ),
     PlantedBlunder(
         "north untold", "", (0.0, 1.0, 2.0), of_section("setup", lambda _: {"untold": ("north",)}), JOINT
     ),
     PlantedBlunder(
-        "collar wrong", "deg", (0.5, 2.0, 8.0), of_told(lambda deg: {"collar_north_deg": deg})
+        "collar wrong", "deg", (0.5, 2.0, 8.0), of_told(lambda deg: {"collar_north_deg": deg}),
+        (K.COLLAR_WRONG,),
+    ),
+    PlantedBlunder(
+        "stick-up told too high", "m", (0.02, 0.3, 2.0),
+        of_told(lambda m: {"depth_offset_m": -m}), DEPTH, seen_by="the bit at the collar's edge",
     ),
     PlantedBlunder(
         "collar untold", "", (0.0, 1.0, 2.0),
         of_section("setup", lambda _: {"untold": ("collar",)}),
     ),
     PlantedBlunder(
-        "tube longer", "m", (0.02, 0.1, 0.5),
-        of_told(lambda m: {"lengths_off_m": of_tube(TUBE, m)}), DEPTH,
+        "tube longer", "m", (0.002, 0.1, 0.5),
+        of_told(lambda m: {"lengths_off_m": of_tube(TUBE, m)}), DEPTH, seen_by="a tape along the tube",
     ),
     PlantedBlunder("depth scale", "", (0.002, 0.02, 0.1), of_told(lambda part: {"depth_scale": part}), DEPTH),
-    PlantedBlunder("stick-up wrong", "m", (0.05, 0.3, 2.0), of_told(lambda m: {"depth_offset_m": m}), DEPTH),
+    PlantedBlunder("stick-up told too low", "m", (0.02, 0.3, 2.0), of_told(lambda m: {"depth_offset_m": m}), DEPTH),
     PlantedBlunder(
         "depth stuck", "s", (20.0, 60.0, 150.0),
         of_told(lambda s: {"depth_stuck_after_s": MIDDLE_S, "depth_stuck_s": s}), DEPTH,

@@ -1,8 +1,8 @@
-"""What becomes of a blunder: it is named rightly, told as a doubt, or too small to matter.
+"""What becomes of a blunder: it is named rightly, told as a doubt, too small to matter, or in no reading at all.
 
 Rigs are those of the study ``set-up``, each with one blunder of a kind and a size beside what is drawn. The worst
 error of a station, direction or position, is counted in what is stated of it. Beyond three standard deviations a hole
-may not be ON TARGET without a word: that is ``missed``.
+may not be ON TARGET without a word: that is ``missed``, or ``unseen`` where only a check beside the readings sees it.
 """
 
 from __future__ import annotations
@@ -92,30 +92,33 @@ def run_rig(job: BlunderJob) -> BlunderRun:
         return BlunderRun(float(np.sqrt(squares.max(initial=0.0))), direction, toe, answer_of(ground))
 
 
-def outcome_of(run: BlunderRun, named: Sequence[str]) -> str:
-    """What became of a blunder."""
+def outcome_of(run: BlunderRun, named: Sequence[str], seen_by: str = "") -> str:
+    """What became of a blunder; ``seen_by`` is the check that alone sees one that is in no reading."""
     if any(cause in named for cause in run.answer.causes):
         return "named"
     if run.answer.is_doubted:
         return "doubted"
-    return "below" if run.worst <= BEYOND else "missed"
+    if run.worst <= BEYOND:
+        return "below"
+    return "unseen" if seen_by else "missed"
 
 
 def blunder_row(kind: PlantedBlunder, size: int, runs: Sequence[BlunderRun]) -> dict[str, Any]:
     """Row of one kind and size."""
-    counts = Counter(outcome_of(run, kind.named) for run in runs)
+    counts = Counter(outcome_of(run, kind.named, kind.seen_by) for run in runs)
     beyond = [run for run in runs if run.worst > BEYOND]
     on_target = sum(run.answer.word == "on_target" for run in beyond)
     return {
         "case": kind.name,
         "size": f"{kind.sizes[size]:g} {kind.unit}".strip(),
         "rigs": len(runs),
-        **{name: counts[name] for name in ("named", "doubted", "below", "missed")},
+        **{name: counts[name] for name in ("named", "doubted", "below", "unseen", "missed")},
         "beyond_on_target": on_target,
         "worst_sigmas": float(np.median([run.worst for run in runs])),
         "direction_sigmas": float(np.median([run.direction for run in runs])),
         "toe_mm": float(np.nanmedian([run.toe_mm for run in runs])),
         "causes": most_common_causes(runs),
+        "seen_by": kind.seen_by,
     }
 
 
@@ -129,12 +132,14 @@ def honest_row(runs: Sequence[BlunderRun]) -> dict[str, Any]:
         "named": sum(bool(run.answer.causes) for run in runs),
         "doubted": sum(run.answer.is_doubted for run in runs),
         "below": sum(run.worst <= BEYOND for run in runs),
+        "unseen": 0,
         "missed": sum(not run.answer.is_doubted for run in beyond),
         "beyond_on_target": sum(run.answer.word == "on_target" for run in beyond),
         "worst_sigmas": float(np.median([run.worst for run in runs])),
         "direction_sigmas": float(np.median([run.direction for run in runs])),
         "toe_mm": float(np.nanmedian([run.toe_mm for run in runs])),
         "causes": most_common_causes(runs),
+        "seen_by": "",
     }
 
 
@@ -147,11 +152,15 @@ def most_common_causes(runs: Sequence[BlunderRun]) -> str:
 def verdict_lines(result: dict[str, Any]) -> list[str]:
     """What may never be, and how often honest holes are blamed."""
     rows = [row for row in result["cases"] if row["case"] != HONEST]
-    missed, wrong = sum(row["missed"] for row in rows), sum(row["beyond_on_target"] for row in rows)
+    missed = sum(row["missed"] for row in rows)
+    wrong = sum(row["beyond_on_target"] for row in rows if not row["seen_by"])
+    unseen = sum(row["unseen"] for row in rows)
+    checks = sorted({row["seen_by"] for row in rows if row["unseen"]})
     share = result["blamed"] / result["honest"]
     word = "holds" if share <= FALSELY_BLAMED else "is missed"
     return [
         f"{len({row['case'] for row in rows})} kinds: {missed} of {sum(row['rigs'] for row in rows)} rigs beyond "
         f"{BEYOND:g} standard deviations without a word, {wrong} of them or others ON TARGET; 0 expected",
+        f"{unseen} more are in no reading, and are seen by {', '.join(checks) or 'nothing else'}",
         f"honest holes: {result['blamed']} of {result['honest']} blamed; one in a thousand {word}",
     ]

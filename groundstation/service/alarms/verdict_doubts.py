@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from groundstation.config import GroundConfig
 from groundstation.service.alarms.rig_alarms import RigAlarms
 from groundstation.service.alarms.verdict import Known, VerdictDoubt
+from groundstation.service.hole.examined_hole import UNSOLVED
 from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.service.setup.readiness import told_briefly
 from groundstation.service.setup.setup_book import SetupBook
@@ -64,7 +65,7 @@ def _doubts_of_surveys(
     deepest, bit = stations[-1], string.bit
     if bit is not None and bit - deepest.md > behind:
         yield VerdictDoubt.STALE, f"the bit is at {bit:.1f} m, the deepest survey at {deepest.md:.1f} m"
-    for md in hole.trajectory.turned_back:
+    for md in hole.turned_back:
         yield VerdictDoubt.YAW, f"the survey at {md:.1f} m points back up the hole"
     if not deepest.is_trusted:
         yield VerdictDoubt.YAW, f"the yaw of the survey at {deepest.md:.1f} m is untrusted"
@@ -72,9 +73,12 @@ def _doubts_of_surveys(
 
 def _contradictions(hole: SurveyedHole) -> Iterator[tuple[VerdictDoubt, str]]:
     """What is wrong with the hole and may be one thing or another."""
-    if hole.is_adjusted and hole.examined is not None:
-        for sentence in hole.examined.doubts:
-            yield VerdictDoubt.CONTRADICTION, sentence
+    if not hole.is_adjusted:
+        return
+    if hole.is_unsolved:
+        yield VerdictDoubt.CONTRADICTION, UNSOLVED
+    for sentence in hole.examined.doubts if hole.examined is not None else ():
+        yield VerdictDoubt.CONTRADICTION, sentence
 
 
 def _doubts_of_time(string: KnownString, alarms: RigAlarms, stale_after: float) -> Iterator[tuple[VerdictDoubt, str]]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from groundstation.service.alarms.encoder_cross_check import OFF_BEFORE, EncoderCrossCheck
 from groundstation.service.alarms.rig_alarms import RigAlarms
+from groundstation.service.hole.examined_hole import UNSOLVED
 from groundstation.service.hole.placement import UNTRUSTED, Placement
 from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.service.string.depth import CONTRADICTION
@@ -100,6 +101,8 @@ class Watch:
         """Tell what is wrong with the hole by its surveys, and what is not any more."""
         examined = self._hole.examined if self._hole.is_adjusted else None
         blunders = {} if examined is None else examined.by_subject
+        if self._hole.is_adjusted and self._hole.is_unsolved:
+            blunders = {"hole": [UNSOLVED]}
         for subject in self._blamed - blunders.keys():
             self._alarms.clear("blunder", subject)
         for subject, sentences in blunders.items():
@@ -264,7 +267,8 @@ class Watch:
         bit = string.bit
         comparable = was_heard and not silent and string.knows_tubes
         misfit = string.tally.misfit(bit, string.heard) if bit is not None and comparable else ""
-        self._alarms.hold("depth_contradicts", "depth", misfit)
+        by_surveys = self._hole.depth_misfit(self._depths.accepted_at(self._time.epoch))
+        self._alarms.hold("depth_contradicts", "depth", misfit or by_surveys)
 
     def _look_at_surveys(self) -> None:
         time, waiting = self._time, self._placement.waiting

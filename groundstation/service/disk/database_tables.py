@@ -7,8 +7,8 @@ import functools
 import sqlalchemy as sa
 from sqlalchemy.dialects import sqlite
 
-SCHEMA = 4
-READABLE = (2, 3, 4)  # schemas; what a later one has more is made when it is opened
+SCHEMA = 5
+READABLE = (2, 3, 4, 5)  # schemas; what a later one has more is made when it is opened
 METADATA = sa.MetaData()
 META = sa.Table(
     "meta",
@@ -96,6 +96,16 @@ SETUP = sa.Table(
 )
 ALL_SETUP, ADD_SETUP = sa.select(SETUP).order_by(SETUP.c.number), sa.insert(SETUP)
 DROP_ALARM, ADD_ALARM = sa.delete(ALARMS).where(ALARMS.c.number == sa.bindparam("its_number")), sa.insert(ALARMS)
+MOMENTS = sa.Table(
+    "moments",
+    METADATA,
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("basis", sa.String(64), nullable=False),
+    sa.Column("content", sa.LargeBinary, nullable=False),
+)
+ALL_MOMENTS = sa.select(MOMENTS).where(MOMENTS.c.basis == sa.bindparam("its_basis")).order_by(MOMENTS.c.number)
+MOMENT_NUMBERS = sa.select(MOMENTS.c.number)
+DROP_MOMENT, ADD_MOMENT = sa.delete(MOMENTS).where(MOMENTS.c.number == sa.bindparam("its_number")), sa.insert(MOMENTS)
 
 
 @functools.cache

@@ -22,6 +22,7 @@ from groundstation.service.disk.database import Database
 from groundstation.service.disk.database_tables import (
     ADD,
     ADD_ALARM,
+    ADD_MOMENT,
     ADD_SETUP,
     ADD_STAND,
     ALARMS,
@@ -29,14 +30,18 @@ from groundstation.service.disk.database_tables import (
     ALL_BLOCKS,
     ALL_JOINTS,
     ALL_MESSAGES,
+    ALL_MOMENTS,
     ALL_SETUP,
     ALL_STANDS,
     BLOCKS,
     DROP,
     DROP_ALARM,
+    DROP_MOMENT,
     DROP_OVERLAPS,
     FIND,
     JOINTS,
+    MOMENT_NUMBERS,
+    MOMENTS,
     PLACE,
     PROGRESS,
     RECALIBRATION,
@@ -45,6 +50,8 @@ from groundstation.service.disk.database_tables import (
     WHOLE_STRING,
     add_new,
 )
+from groundstation.service.disk.moment_record import DamagedMomentError, moment_of_bytes, moment_to_bytes
+from groundstation.service.hole.history import Moment
 from groundstation.service.setup.told_value import DamagedSetupError, ToldValue, told_of_text, told_to_text
 from groundstation.service.string.depth import NEVER, DepthDoubt, Instant
 from groundstation.service.string.stored import Stored
@@ -278,6 +285,43 @@ class Store(Database):
             except DamagedSetupError:
                 self.damaged += 1
         return found
+
+    def keep_moments(self, basis: str, moments: Sequence[Moment], dropped: Iterable[int] = ()) -> None:
+        """Store what was known at the end of stops, by a basis, in the place of what was kept of them before.
+
+        Raises
+        ------
+        StoreError
+            When the disk refuses.
+        """
+        rows = [{"number": one.number, "basis": basis, "content": moment_to_bytes(one)} for one in moments]
+        gone = [{"its_number": number} for number in {*dropped, *(one.number for one in moments)}]
+        with self._writing() as connection:
+            if gone:
+                connection.execute(DROP_MOMENT, gone)
+            if rows:
+                connection.execute(ADD_MOMENT, rows)
+
+    def moments(self, basis: str) -> list[Moment]:
+        """What was kept of stops by a basis, the oldest first; what is damaged is passed over, to be made anew."""
+        if not self._has(MOMENTS):
+            return []
+        with self._refusing(), self._engine.connect() as connection:
+            rows = connection.execute(ALL_MOMENTS, {"its_basis": basis}).all()
+        found = []
+        for row in rows:
+            try:
+                found.append(moment_of_bytes(row.number, row.content))
+            except DamagedMomentError:
+                continue
+        return found
+
+    def moment_numbers(self) -> list[int]:
+        """Numbers of all moments that are kept, whatever they rest on."""
+        if not self._has(MOMENTS):
+            return []
+        with self._refusing(), self._engine.connect() as connection:
+            return [row.number for row in connection.execute(MOMENT_NUMBERS)]
 
 
 def _join_numbers(*values: float) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 
 from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.survey.bearings import planes_across
+from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import direction_angles
 from groundstation.survey.fusion.sphere_direction import on_sphere
 
@@ -22,7 +23,7 @@ def collar_doubt(hole: SurveyedHole, curvature_std: float) -> str:
     station = next((one for one in hole.stations if one.md > 0.0), None)
     if station is None:
         return ""
-    first, collar = hole.direction_of(station), hole.collar
+    first, collar = station.fused(Weighting.BAYES), hole.collar  # an adjusted hole is adjusted to the collar too
     bend = (curvature_std * station.md) ** 2
     here, there = on_sphere(first), on_sphere(collar)
     axes = planes_across(there.tangent)

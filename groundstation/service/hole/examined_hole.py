@@ -9,20 +9,30 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.blunder_cost import BlunderCost, cost_blunders
 from groundstation.survey.adjustment.blunder_words import say_blunder
 from groundstation.survey.adjustment.blunders import Blunder, Examination, chance_of_one
-from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, toe_budget
+from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, prior_shares, toe_budget
 from groundstation.survey.adjustment.hypotheses import BlunderKind, Hypothesis
+from groundstation.survey.adjustment.least_found import LARGEST, possible_mistakes
 from groundstation.survey.adjustment.next_stop import NextStop, plan_stop
 from groundstation.survey.adjustment.reliability import Reliability, measure_reliability
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
-from groundstation.survey.adjustment.toe_weights import toe_weights
+from groundstation.survey.adjustment.toe_weights import position_weights, toe_weights
+from groundstation.survey.fusion.shared import KINDS
 
 Array = npt.NDArray[np.float64]
 LEVEL = 2  # of north, east and down those across a hole
 OF_TUBE = (ShareSource.BIAS, ShareSource.TILT)
-LARGEST_STEP = 0.2  # m/s^2, by which an accelerometer that was knocked may step: 20 mg
-STEP = BlunderKind.BIAS_STEPPED
+SOURCE_NAMES = {
+    ShareSource.BIAS: "accelerometer_bias", ShareSource.TILT: "mounts", ShareSource.COLLAR: "collar",
+    ShareSource.PATH: "path",
+}  # fmt: skip
+UNEXPLAINED = "the newest surveys contradict those before; what is wrong is being looked for"
+UNSOLVED = (
+    "the surveys cannot be adjusted to each other, so every station stands for itself and nothing is found that is "
+    "wrong: check what was told of the rig, and the newest surveys"
+)
 
 
 @dataclass(frozen=True)  # with a dictionary, for what is worked out once
@@ -34,11 +44,15 @@ class ExaminedHole:
     examination : with what was found to be wrong
     run : how the string was run
     tubes : numbers of the tubes by their places
+    surveys : how many there were when it was looked for what is wrong
+    is_open : whether more seems to be wrong than was looked for yet
     """
 
     examination: Examination
     run: RunOfStops
     tubes: tuple[str, ...]
+    surveys: int
+    is_open: bool = False
 
     @property
     def adjusted(self) -> Adjusted:
@@ -52,14 +66,17 @@ class ExaminedHole:
     @property
     def doubts(self) -> list[str]:
         """Sentences of what may be one thing or another."""
-        return [self.sentence(one) for one in self.examination.blunders if one.is_doubt]
+        found = [self.sentence(one) for one in self.examination.blunders if one.is_doubt]
+        return [*found, UNEXPLAINED] if self.is_open else found
 
     def subject(self, one: Hypothesis) -> str:
-        """What a blunder is of: a tube, the hole, the depth or the encoder."""
+        """What a blunder is of: a tube, the hole, the collar, the depth or the encoder."""
         if one.kind is BlunderKind.HOLE_MOVED:
             return "hole"
         if one.kind in (BlunderKind.DEPTH_WRONG_ONCE, BlunderKind.DEPTH_WRONG_FROM):
             return "depth"
+        if one.kind is BlunderKind.COLLAR_WRONG:
+            return "collar"
         return f"tube {self.tubes[one.subject[0]]}" if one.subject else "encoder"
 
     @property
@@ -84,21 +101,34 @@ class ExaminedHole:
         return share.source.value, f"tube {self.tubes[share.subject]}" if is_of_tube else ""
 
     @cached_property
+    def position_variances(self) -> dict[str, Array]:
+        """Variances (s + 1, 3), m^2, of collar and stations to north, east and down by what looks have in common."""
+        found: dict[str, Array] = {}
+        for share in prior_shares(self.adjusted, position_weights(self.adjusted), self.run.causes):
+            name = SOURCE_NAMES.get(share.source)
+            if share.source is ShareSource.TURN:
+                name = KINDS.get(self.share_name(share)[0], "joints")
+            if name is not None:
+                found[name] = found.get(name, 0.0) + share.variances.reshape(-1, 3)
+        return found
+
+    @cached_property
     def next_stop(self) -> NextStop | None:
         """What the angle of the next stop is worth; None before two stations, from which the length is taken."""
         md = self.adjusted.path.md
         return plan_stop(self.adjusted, float(md[-1] - md[-2])) if len(md) > LEVEL else None
 
     @cached_property
-    def steps_found(self) -> list[Reliability]:
-        """How well a step of each accelerometer at its newest stop would be found."""
-        looks = self.adjusted.looks
-        newest = {int(tube): int(stop) for tube, stop in zip(looks.tube, looks.stop, strict=True)}
-        steps = [Hypothesis(STEP, (tube,), stop) for tube, stop in newest.items()]
-        chance = chance_of_one(looks, self.run)
-        return measure_reliability(
-            self.adjusted, self.run, steps, toe_weights(self.adjusted), {STEP: LARGEST_STEP}, chance
-        )
+    def costs(self) -> list[BlunderCost | None]:
+        """What each blunder costs at the toe."""
+        return cost_blunders(self.examination)
+
+    @cached_property
+    def reliabilities(self) -> list[Reliability]:
+        """How well what may go wrong with each tube at its newest stop, and with the string, would be found."""
+        found, run = self.adjusted, self.run
+        possible, chance = possible_mistakes(found.looks, run), chance_of_one(found.looks, run)
+        return measure_reliability(found, run, possible, toe_weights(found), LARGEST, chance)
 
 
 def std_across(variances: Array) -> float:

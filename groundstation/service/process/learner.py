@@ -11,12 +11,14 @@ from groundstation.service.alarms.watch import Watch
 from groundstation.service.answers.model import RigModel
 from groundstation.service.disk.ground_store import Store
 from groundstation.service.disk.keeper import StringKeeper
+from groundstation.service.disk.moment_keeper import MomentKeeper
 from groundstation.service.hole.deviation_alarms import DeviationAlarm
 from groundstation.service.hole.resolving import Found
 from groundstation.service.string.stored import Stored
 from telemetry.messages import Event, Kept, StaticRecord, SurveyMeasurement
 
-CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column", "setup")
+CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column")
+ONCE_RESTED = ("adjustment", "setup")  # what all surveys say of each thing, which takes long to work out
 RESTORED_TOGETHER = 256  # messages
 
 
@@ -36,10 +38,13 @@ class Learner:
         self._string, self._hole, self._placement = model.string, model.hole, model.placement
         self._orders, self._recalibration = model.orders, model.recalibration
         self._setup = model.setup
+        self._moments = MomentKeeper(store, model.config, model.setup, model.hole)
         self._followed = 0  # version of the setup by which the hole is
         self._arrived: list[Stored[Kept]] = []  # since the last transaction
         # alarms of the hole, moves and stops of the string that were told
         self._known: tuple[list[DeviationAlarm], int, int] = ([], 0, 0)
+        # versions of the hole at the last look, and as its adjustment was published
+        self._rested = self._shown = model.hole.version
         self._by_survey = CHANGED_BY_SURVEY if model.wall is None else (*CHANGED_BY_SURVEY, "wall")
 
     def take(self, message: Kept) -> None:
@@ -115,15 +120,31 @@ class Learner:
         Measurements come one by one, tube by tube: to be asked at every look, and not for each of them.
         """
         hole = self._hole
+        is_explained = hole.adopt_found()
         before, self._known = self._known, (list(hole.alarms.alarms), len(hole.moved), hole.history.count)
-        paths = {"alarms": before[:2] != self._known[:2], "history": before[2] != self._known[2]}
-        return [path for path, has_changed in paths.items() if has_changed]
+        self._moments.keep()
+        paths = {
+            "alarms": before[:2] != self._known[:2],
+            "history": before[2] != self._known[2],
+            **dict.fromkeys(ONCE_RESTED, self._has_rested()),
+        }
+        changed = [path for path, has_changed in paths.items() if has_changed]
+        return sorted({*changed, *self._by_survey, "alarms"}) if is_explained else changed
+
+    def _has_rested(self) -> bool:
+        """Whether no survey has come since the last look, and some before."""
+        before, self._rested = self._rested, self._hole.version
+        if not before == self._rested != self._shown:
+            return False
+        self._shown = self._rested
+        return True
 
     def restore(self) -> None:
         """Go on with everything that was stored, some hundred messages at a time."""
         self._setup.add(self._store.told())
-        self._hole.begin_anew()
+        self._hole.begin_anew(self._moments.recall())
         self._restore_messages()
+        self._hole.catch_up()
         self.follow_setup()  # what a node says of its joints may stand in a later survey
         self.find_consequences()
 
@@ -142,10 +163,11 @@ class Learner:
                 for one in self._store.messages()
                 if isinstance(message := one.message, SurveyMeasurement) and one.md is not None
             ]
+            kept = self._moments.recall()
         except StoreError:
             return []
         self._store.damaged = damaged  # they were counted at the start
-        self._hole.begin_anew()
+        self._hole.begin_anew(kept)
         for begin in range(0, len(placed), RESTORED_TOGETHER):
             some = placed[begin : begin + RESTORED_TOGETHER]
             found = self._placement.resolve_measurements([m for m, _ in some], [md for _, md in some])
@@ -153,8 +175,9 @@ class Learner:
                 if stop is not None:
                     self._hole.add_stop(*stop, self._string.epoch_of(measurement))
         self._followed = version
+        self._hole.catch_up()
         self.find_consequences()
-        return sorted({*self._by_survey, "alarms", "history", "verdict", "status"})
+        return sorted({*self._by_survey, "setup", "alarms", "history", "verdict", "status"})
 
     def _restore_messages(self) -> None:
         """Learn everything that was stored."""

@@ -204,6 +204,11 @@ class DepthLog:
         stand = self.stands[k] if k >= 0 else None
         return stand.md if stand is not None and stand.epoch == epoch and time <= stand.ended_at else None
 
+    def accepted_at(self, epoch: int) -> float:
+        """Rig time (s) of an epoch up to which the crew has looked at the depth; minus infinity where it has not."""
+        own, time = self._accepted
+        return time if own == epoch else -math.inf
+
     def accept(self) -> None:
         """Believe the next reading, whatever came before."""
         if self._raw is not None:

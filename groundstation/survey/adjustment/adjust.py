@@ -2,7 +2,8 @@
 
 The unknowns are the direction and the curvature of the hole at collar and stations, and for each tube the bias of its
 accelerometer, the tilt of its mount and the turn of its chain; gravity, and what blunders were found. All have priors.
-How far a tube lies askew in the hole at each stop (play and bend) is learnt from what the looks leave.
+How far a tube lies askew in the hole at each stop (play and bend) is learnt from what the looks leave, and so is how
+sharply the hole bends.
 Source: Gauss-Newton; variance components after Foerstner, "Ein Verfahren zur Schaetzung von Varianz- und
 Kovarianzkomponenten", AVN 86 (1979).
 """
@@ -15,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted, Linearised, LinearSolution
+from groundstation.survey.adjustment.curvature_size import learnt_curvature
 from groundstation.survey.adjustment.equations import (
     Equations,
     path_equations,
@@ -24,14 +26,16 @@ from groundstation.survey.adjustment.equations import (
 from groundstation.survey.adjustment.kernels.observations import add_looks, linearise_looks
 from groundstation.survey.adjustment.kernels.path_elimination import eliminate_path, substitute_path
 from groundstation.survey.adjustment.looks import OF_TUBE, FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
-from groundstation.survey.adjustment.play import PLAY_KNOWN_AS, learnt_play
+from groundstation.survey.adjustment.play import PLAY_KNOWN_AS, faster_play, learnt_play
 from groundstation.survey.adjustment.sphere import carried_bases, step_directions
 from groundstation.survey.adjustment.starting_point import first_start
 
 Array = npt.NDArray[np.float64]
 ITERATIONS = 12
-SETTLED = 1e-3  # standard deviations, of the last step
+SETTLED = 1e-2  # standard deviations, of the last step; what is left then is a thirtieth of it
+NEAR = 3.0  # standard deviations, of a step from which on the play is not that of unknowns still on their way
 PLAY_SETTLED = 0.02  # of its variance
+LEGS_SETTLED = 0.1  # of the variance of each leg
 GROSS = 16.27  # chi-square of three beyond which a look counts less: one in a thousand
 
 
@@ -61,18 +65,25 @@ def adjust_hole(
     if len(now.extra) != len(extra.std):
         now = replace(now, extra=np.zeros(len(extra.std)))
     known = string_information(string, extra)
+    tried: list[tuple[float, float]] = []
     for _ in range(ITERATIONS):
         bases = carried_bases(now.tangents)
         linear = linearise_all(looks, now, bases, extra)
         solution = solve_equations(
             looks, linear, path_equations(path, now, bases), known, string_departure(string, now), extra
         )
+        if not np.isfinite(solution.step):
+            raise np.linalg.LinAlgError("expected a step of the unknowns, got numbers that are none")
         now = _stepped(now, bases, solution)
         found = Adjusted(looks, string, path, extra, now, linear, solution, known)
         play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)
-        if solution.step < SETTLED and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var:
+        whole, legs = learnt_curvature(found)
+        is_bent = bool(np.all(np.abs(legs - now.leg_vars) <= LEGS_SETTLED * now.leg_vars))
+        if solution.step < SETTLED and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var and is_bent:
             break
-        now = replace(now, play_var=play)
+        tried = [*tried, (now.play_var, play)] if solution.step < NEAR else []
+        play = faster_play(tried) if tried else play
+        now = replace(now, play_var=play, curvature_var=whole, leg_vars=legs)
     return found
 
 
@@ -151,5 +162,7 @@ def _stepped(now: StartingPoint, bases: Array, solution: LinearSolution) -> Star
         now.make_ups + solution.common[make_ups],
         now.gravity + float(solution.common[size]),
         now.play_var,
+        now.curvature_var,
+        now.leg_vars,
         now.extra + solution.common[make_ups.stop :],
     )

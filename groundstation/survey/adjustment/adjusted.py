@@ -47,10 +47,10 @@ class LinearSolution:
 
     @property
     def step(self) -> float:
-        """Largest step of an unknown in its standard deviations, at most as the equations know them."""
+        """Largest step of an unknown in its standard deviations, at most as the equations know them; NaN if one is."""
         of_common = np.max(np.abs(self.common) / np.sqrt(np.diag(self.cov)), initial=0.0)
         rigid = np.einsum("kab,kab->ka", self.diagonal, self.diagonal)  # of what is left of each block
-        return float(max(of_common, np.max(np.abs(self.states) * np.sqrt(rigid))))
+        return float(np.maximum(of_common, np.max(np.abs(self.states) * np.sqrt(rigid))))
 
 
 @dataclass(frozen=True)  # with a dictionary, for what is worked out once
@@ -101,7 +101,13 @@ class Adjusted:
     @cached_property
     def columns(self) -> Array:
         """Change of every state (s + 1, 4, p) for one standard deviation of independent errors in common."""
-        return np.asarray(self.by_common @ np.linalg.cholesky(self.common_cov))
+        flat = self.by_common.reshape(-1, len(self.common_cov))
+        return np.asarray((flat @ self.common_root).reshape(self.by_common.shape))
+
+    @cached_property
+    def common_root(self) -> Array:
+        """Lower triangular root (p, p) of that covariance."""
+        return np.asarray(np.linalg.cholesky(self.common_cov))
 
     @cached_property
     def covs(self) -> Array:
@@ -146,12 +152,13 @@ class Adjusted:
         from groundstation.survey.adjustment.kernels.free_parts import free_parts
 
         found = np.empty((len(self.looks), 3, 3))
-        direction = self.by_common[:, :2]
+        direction = np.ascontiguousarray(self.by_common[:, :2])
+        with_common = (direction.reshape(-1, len(self.common_cov)) @ self.common_cov).reshape(direction.shape)
         free_parts(
             self.looks.station, self.looks.tube, self.looks.make_up, self.linear.jacobians, self.linear.weights,
             self.extra.columns,
             OF_TUBE * self.string.count, self.covs[:, :2, :2].copy(),
-            (direction @ self.common_cov), self.common_cov, found,
+            with_common, self.common_cov, found,
         )  # fmt: skip
         return found
 

@@ -16,7 +16,15 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, Hypothesis, all_hypotheses
+from groundstation.survey.adjustment.collar import collar_departure
+from groundstation.survey.adjustment.hypotheses import (
+    BY_DEPTH,
+    KNOWN_SIZE,
+    WIDTHS,
+    BlunderKind,
+    Hypothesis,
+    all_hypotheses,
+)
 from groundstation.survey.adjustment.looks import Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.scores import Score, log_chances, log_tail, score_hypotheses
@@ -31,6 +39,8 @@ MOST_TRIED = 8
 AS_GOOD = 0.3  # part of the best's logarithm that is worth trying; play hides the rest
 PARTED = math.log(100.0)  # by how much the best outdoes the second, or it is a doubt
 MOST_BLUNDERS = 4
+TUBES_MISCOUNTED = 1.5  # spacings of stations by which a depth may be off: one tube too many, and a little
+COLLAR = Hypothesis(BlunderKind.COLLAR_WRONG, ())
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,9 +106,19 @@ class Examination:
     suspicion: Blunder | None = None
 
     @property
+    def taken_in(self) -> tuple[Hypothesis, ...]:
+        """What the adjustment has as further unknowns or put right in its looks, in its order."""
+        return _taken_in([*self.blunders, *filter(None, [self.suspicion])])
+
+    @property
     def global_ratio(self) -> float:
         """Weighted squares of what is left over what they are to be: 1 in an honest hole."""
         return global_ratio(self.adjusted)
+
+    @property
+    def doubts_collar(self) -> bool:
+        """Whether what was told of the collar counts no more, for a blunder or the suspicion of one."""
+        return COLLAR in _taken_in([*self.blunders, *filter(None, [self.suspicion])])
 
 
 def global_ratio(found: Adjusted) -> float:
@@ -138,6 +158,29 @@ def examine_hole(
     return Examination(now.found, blunders, suspicion)
 
 
+def examine_known(
+    looks: Looks,
+    string: StringPrior,
+    path: PathPrior,
+    run: RunOfStops,
+    before: Examination | None = None,
+    start: StartingPoint | None = None,
+) -> tuple[Examination, bool]:
+    """Adjust a hole with what was found before, and say whether more seems to be wrong, without looking for it.
+
+    Where nothing was found before and nothing seems to be wrong it comes to the same as ``examine_hole``.
+
+    Parameters
+    ----------
+    looks, string, path, run, start : as of ``examine_hole``
+    before : of fewer looks, whose stations, stops and tubes have the places that they had
+    """
+    known, suspicion = ((), None) if before is None else (before.blunders, before.suspicion)
+    now = adjust_with(looks, string, path, run, _taken_in([*known, *filter(None, [suspicion])]), start)
+    blunders = tuple(_resized(one, now, _taken_in(known)) for one in known)
+    return Examination(now.found, blunders, suspicion), is_suspicious(now.found, run)
+
+
 def _resized(blunder: Blunder, now: TakenIn, taken_in: tuple[Hypothesis, ...]) -> Blunder:
     """A blunder with its size as all looks and the other blunders have it now; a doubt keeps those of its trials."""
     if blunder.is_doubt:
@@ -167,16 +210,37 @@ def find_blunder(
     """
     found = now.found
     hypotheses = [one for one in all_hypotheses(looks, run) if one not in known]
-    worth = best_of_kinds(score_hypotheses(found, run, hypotheses), found)
+    worth = best_of_kinds([*score_hypotheses(found, run, hypotheses), *_score_of_collar(found, known)], found)
     if not worth:
         return None
     many = log_of_level(looks, run)
     adjusted = [_tried(looks, string, path, run, found, known, one) for one in worth]
-    tried = [(with_one, _explained(with_one, found, one, many)) for with_one, one in zip(adjusted, worth, strict=True)]
+    tried = [
+        (with_one, _explained(with_one, found, one, many))
+        for with_one, one in zip(adjusted, worth, strict=True)
+        if is_plausible(one, with_one.sizes[-1], run)
+    ]
+    if not tried:
+        return None
     tried.sort(key=lambda pair: pair[1].log_chance)
     with_best, best = tried[0]
     second = tried[1][1] if len(tried) > 1 else None
     return Blunder(best, second, global_ratio(found), global_ratio(with_best.found))
+
+
+def is_plausible(one: Hypothesis, size: Array, run: RunOfStops) -> bool:
+    """Whether a blunder of a size can be: a depth is off by a tube that was not counted, never by half of the hole."""
+    spacing = float(np.max(np.diff(run.station_md), initial=0.0))
+    return one.kind not in BY_DEPTH or abs(float(size[0])) <= TUBES_MISCOUNTED * spacing
+
+
+def _score_of_collar(found: Adjusted, known: tuple[Hypothesis, ...]) -> list[Score]:
+    """How well it explains what is left that the collar was told wrong; nothing where that is taken in."""
+    if COLLAR in known:
+        return []
+    off = collar_departure(found)
+    free = np.asarray(np.linalg.pinv(off.cov), np.float64)[None]
+    return [Score((COLLAR,), off.size[None], free, np.array([off.told], np.intp), np.array([off.squares]))]
 
 
 def chance_of_one(looks: Looks, run: RunOfStops) -> float:
@@ -186,8 +250,8 @@ def chance_of_one(looks: Looks, run: RunOfStops) -> float:
 
 def log_of_level(looks: Looks, run: RunOfStops) -> float:
     """Logarithm of how many chances an honest hole has: of all hypotheses, and of all stops."""
-    hypotheses = sum(1 for _ in all_hypotheses(looks, run))
-    return math.log(max(1, hypotheses)) + log_of_stops(looks)
+    hypotheses = 1 + sum(1 for _ in all_hypotheses(looks, run))  # and the collar
+    return math.log(hypotheses) + log_of_stops(looks)
 
 
 def log_of_stops(looks: Looks) -> float:
@@ -226,7 +290,10 @@ def _tried(
 
 def _explained(with_one: TakenIn, found: Adjusted, one: Hypothesis, many: float) -> Explanation:
     """What a hypothesis explains, from the likelihood of the looks without and with it."""
-    gain = max(0.0, deviance_of(found) - deviance_of(with_one.found))
+    if one == COLLAR:
+        gain = collar_departure(found).squares  # the likelihood is that of the looks, and the collar is in none
+    else:
+        gain = max(0.0, deviance_of(found) - deviance_of(with_one.found))
     free = max(1.0, with_one.found.redundancy)
     squares = math.expm1(min(gain / free, 500.0)) * free
     told = np.array([WIDTHS[one.kind]])

@@ -46,18 +46,13 @@ def path_equations(path: PathPrior, start: StartingPoint, bases: Array) -> tuple
     off = bends_between(np.stack([start.tangents[0], path.collar]), bases[:1].repeat(2, axis=0))[0]
     diagonal[0, :2, :2] += collar
     right[0, :2] += collar @ off
-    rigid = path.curvature_std**-2
+    rigid = 1.0 / start.curvature_var
     diagonal[0, 2:, 2:] += rigid * np.eye(2)
     right[0, 2:] -= rigid * start.curvatures[0]
     if count > 1:
-        steps = [process_step(length, path.correlation_length) for length in np.diff(path.md).tolist()]
-        go = np.array([step[0][1:, 1:] for step in steps])
-        weight = np.linalg.inv(path.curvature_std**2 * np.array([step[1][1:, 1:] for step in steps]))
-        go, weight = _for_both_axes(go), _for_both_axes(np.asarray(weight, np.float64))
-        bent = np.concatenate([bends_between(start.tangents, bases), np.diff(start.curvatures, axis=0)], axis=1)
-        lever = go - np.eye(STATE)
-        before = np.concatenate([np.zeros((count - 1, 2)), start.curvatures[:-1]], axis=1)
-        pull = np.einsum("kab,kb->ka", weight, bent - np.einsum("kab,kb->ka", lever, before))
+        go, rigid_legs = leg_steps(path)
+        weight = rigid_legs / start.leg_vars[:, None, None]
+        pull = np.einsum("kab,kb->ka", weight, path_departures(path, start, bases, go))
         back = np.swapaxes(go, 1, 2)
         diagonal[1:] += weight
         diagonal[:-1] += back @ weight @ go
@@ -65,6 +60,21 @@ def path_equations(path: PathPrior, start: StartingPoint, bases: Array) -> tuple
         right[1:] -= pull
         right[:-1] += np.einsum("kab,kb->ka", back, pull)
     return diagonal, tied, right
+
+
+def leg_steps(path: PathPrior) -> tuple[Array, Array]:
+    """How the state of a station goes on to the next (s, 4, 4), and the information (s, 4, 4) of a curvature of 1."""
+    steps = [process_step(length, path.correlation_length) for length in np.diff(path.md).tolist()]
+    go = np.array([step[0][1:, 1:] for step in steps]).reshape(-1, 2, 2)
+    noise = np.array([step[1][1:, 1:] for step in steps]).reshape(-1, 2, 2)
+    return _for_both_axes(go), _for_both_axes(np.asarray(np.linalg.inv(noise), np.float64))
+
+
+def path_departures(path: PathPrior, start: StartingPoint, bases: Array, go: Array) -> Array:
+    """By how much (s, 4) each station departs from what the one above it leads to."""
+    bent = np.concatenate([bends_between(start.tangents, bases), np.diff(start.curvatures, axis=0)], axis=1)
+    before = np.concatenate([np.zeros((len(path.md) - 1, 2)), start.curvatures[:-1]], axis=1)
+    return np.asarray(bent - np.einsum("kab,kb->ka", go - np.eye(STATE), before))
 
 
 def _for_both_axes(matrices: Array) -> Array:

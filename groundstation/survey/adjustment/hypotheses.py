@@ -46,6 +46,7 @@ class BlunderKind(StrEnum):
     AXES_EXCHANGED = auto()
     TUBES_EXCHANGED = auto()
     LOOK_WRONG = auto()
+    COLLAR_WRONG = auto()
 
 
 K = BlunderKind
@@ -59,7 +60,7 @@ OF_CHAIN = (K.JOINT_SLIPPED, K.JOINT_MISREAD, K.ENCODER_SLIPPED)
 BY_TURN = (K.MOUNT_TURNED, K.MOUNT_MISREAD, *OF_CHAIN)
 WIDTHS = {
     **dict.fromkeys(OF_FORCE, 3),
-    **dict.fromkeys((*BY_TILT, K.HOLE_MOVED), 2),
+    **dict.fromkeys((*BY_TILT, K.HOLE_MOVED, K.COLLAR_WRONG), 2),
     **dict.fromkeys((*BY_TURN, *BY_DEPTH, *KNOWN_SIZE), 1),
 }
 
@@ -67,6 +68,8 @@ WIDTHS = {
 @dataclass(frozen=True, slots=True)
 class Hypothesis:
     """One thing that may be wrong.
+
+    The direction at the collar is in no look: that it was told wrong changes what is known of the path, see ``collar``.
 
     Parameters
     ----------
@@ -224,7 +227,7 @@ def _of_joints(looks: Looks, run: RunOfStops, onsets: set[int]) -> Iterator[Hypo
 
 
 def _of_hole(looks: Looks, onsets: set[int]) -> Iterator[Hypothesis]:
-    """Neighbouring stations that moved together: those with looks of at least two tubes from a stop on."""
+    """Neighbouring stations that moved together, or all that were looked at before a stop and from it on."""
     last = int(looks.station.max(initial=0))
     for stop in sorted(onsets):
         since = looks.stop >= stop
@@ -233,3 +236,5 @@ def _of_hole(looks: Looks, onsets: set[int]) -> Iterator[Hypothesis]:
         for first, width in itertools.product(seen, range(2, MOST_MOVED + 1)):
             if set(range(first, first + width)) <= set(seen):
                 yield Hypothesis(K.HOLE_MOVED, (first, first + width - 1), stop)
+        if len(seen) > MOST_MOVED:
+            yield Hypothesis(K.HOLE_MOVED, (seen[0], seen[-1]), stop)

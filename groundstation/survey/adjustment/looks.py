@@ -87,7 +87,7 @@ class PathPrior:
     md : (s + 1,) m, of the collar and every station, growing
     collar : (3,) unit vector down the hole at the collar
     collar_cov : (3, 3) rad^2, of it; none along it
-    curvature_std, correlation_length : rad/m and m, of the curvature that wanders
+    curvature_std, correlation_length : rad/m and m, of the curvature that wanders; the former until the looks tell it
     """
 
     md: Array
@@ -121,4 +121,6 @@ class StartingPoint:
     make_ups: Array  # (u,) rad
     gravity: float
     play_var: float
+    curvature_var: float  # rad^2/m^2, of the hole
+    leg_vars: Array  # (s,) rad^2/m^2, by which each leg is driven
     extra: Array = field(default_factory=lambda: np.zeros(0))

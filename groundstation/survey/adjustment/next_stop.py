@@ -75,7 +75,7 @@ def _last_of_tubes(looks: Looks) -> Places:
 def _ahead(found: Adjusted, length: float) -> tuple[Array, float, float]:
     """Direction (3,) at the next station, lever of the curvature (m) on it, and its variance (rad^2) about that."""
     go, spread = process_step(length, found.path.correlation_length)
-    lever, var = float(go[1, 2]), float(spread[1, 1]) * found.path.curvature_std**2
+    lever, var = float(go[1, 2]), float(spread[1, 1]) * found.now.curvature_var
     bent = found.now.curvatures[-1:] * lever
     return step_directions(found.now.tangents[-1:], found.linear.bases[-1:], bent)[0], lever, var
 

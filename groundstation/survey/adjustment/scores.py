@@ -96,7 +96,7 @@ def whitened_effects(found: Adjusted, rows: Places, weighed: Array) -> tuple[Arr
     reduce_right(diagonal, tied, right)
     flat = right.reshape(-1, right.shape[2])
     left = in_common - coupled.reshape(len(flat), -1).T @ flat
-    return flat, np.asarray(np.linalg.cholesky(found.common_cov).T @ left)
+    return flat, np.asarray(found.common_root.T @ left)
 
 
 def pulled_unknowns(found: Adjusted, rows: Places, weighed: Array) -> tuple[Array, Array]:

@@ -1,8 +1,8 @@
 """A quick look whether anything is wrong with a hole at all, so that a hole that fits costs nearly nothing.
 
-Each look alone, each tube from each stop on, each chain of tubes below a joint from each stop on, and each tube
-against what was known of it before. In a hole of many stops only the latest, which no earlier screen has seen, and each
-tube for itself. Source: Baarda's data snooping, by sums from the end.
+Each look alone, each tube from each stop on, each chain of tubes below a joint from each stop on, and each tube and
+the collar against what was known of them before. In a hole of many stops only the latest, which no earlier screen has
+seen, and each tube for itself. Source: Baarda's data snooping, by sums from the end.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.collar import collar_departure
 from groundstation.survey.adjustment.equations import string_departure, turn_places
 from groundstation.survey.adjustment.looks import BIAS, OF_TUBE, TILT
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
@@ -36,7 +37,7 @@ def is_suspicious(found: Adjusted, run: RunOfStops) -> bool:
 def least_chance(found: Adjusted, run: RunOfStops) -> float:
     """Logarithm of the chance, at most, that an honest hole has any test as unlikely as the worst here."""
     is_whole = len(found.looks) <= MOST_WHOLE
-    tests = [against_prior(found), *(whole_tests(found, run) if is_whole else late_tests(found))]
+    tests = [against_prior(found), against_collar(found), *(whole_tests(found, run) if is_whole else late_tests(found))]
     left, redundancy = (found.squares, found.redundancy) if is_whole else (1e9, 1e9)
     chances = [log_chances(squares, told, left, redundancy) for squares, told in tests]
     return min(float(np.min(some, initial=0.0)) for some in chances) + math.log(sum(len(some) for some in chances))
@@ -54,6 +55,12 @@ def against_prior(found: Adjusted) -> tuple[Array, Places]:
     free = before - np.diag(found.common_cov)[:width]
     is_told = free > LEAST_TOLD * before
     return np.where(is_told, off * off / np.where(is_told, free, 1.0), 0.0), is_told.astype(np.intp)
+
+
+def against_collar(found: Adjusted) -> tuple[Array, Places]:
+    """Squares, of two degrees of freedom, of the collar as it was told against what the stations say of it."""
+    departure = collar_departure(found)
+    return np.array([departure.squares]), np.array([departure.told], np.intp)
 
 
 def whole_tests(found: Adjusted, run: RunOfStops) -> list[tuple[Array, Places]]:

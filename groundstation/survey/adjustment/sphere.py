@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import numpy.typing as npt
+
+from groundstation.survey.adjustment.kernels.carried_bases import carry_bases
 
 Array = npt.NDArray[np.float64]
 TINY = 1e-12
@@ -22,14 +22,7 @@ def carried_bases(tangents: Array) -> Array:
     north = first - (first @ d) * d
     bases[0, 0] = north / np.linalg.norm(north)
     bases[0, 1] = np.cross(d, bases[0, 0])
-    for k, (before, after) in enumerate(itertools.pairwise(tangents)):
-        middle = before + after
-        # the rotation along the great circle from one to the other is two reflections
-        reflected = bases[k] - np.outer(bases[k] @ middle, middle) * (2.0 / max(middle @ middle, TINY))
-        bases[k + 1] = reflected - 2.0 * np.outer(reflected @ after, after) if middle @ middle > TINY else bases[k]
-        bases[k + 1] -= np.outer(bases[k + 1] @ after, after)
-        bases[k + 1, 0] /= np.linalg.norm(bases[k + 1, 0])
-        bases[k + 1, 1] = np.cross(after, bases[k + 1, 0])
+    carry_bases(tangents, bases)
     return bases
 
 

@@ -28,7 +28,9 @@ def first_start(looks: Looks, string: StringPrior, path: PathPrior) -> StartingP
     tubes = np.zeros((string.count, OF_TUBE))
     tubes[:, TURN], make_ups = turns[: string.count], turns[string.count :]
     curvatures = np.zeros((len(path.md), 2))
-    return StartingPoint(tangents, curvatures, tubes, make_ups, string.gravity, string.play_std**2)
+    bends = path.curvature_std**2
+    legs = np.full(len(path.md) - 1, bends)
+    return StartingPoint(tangents, curvatures, tubes, make_ups, string.gravity, string.play_std**2, bends, legs)
 
 
 def _turns(looks: Looks, string: StringPrior, turns: Array) -> Array:

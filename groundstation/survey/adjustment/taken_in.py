@@ -17,6 +17,8 @@ import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjust import adjust_hole, linearise_all
 from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.collar import untold_collar
+from groundstation.survey.adjustment.curvature_size import curvature_deviance
 from groundstation.survey.adjustment.equations import path_equations, string_departure
 from groundstation.survey.adjustment.hypotheses import (
     BY_DEPTH,
@@ -36,12 +38,13 @@ from groundstation.survey.adjustment.kernels.path_elimination import eliminate_p
 from groundstation.survey.adjustment.looks import FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.play import PLAY_KNOWN_AS
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
-from groundstation.survey.adjustment.sphere import carried_bases
+from groundstation.survey.adjustment.sphere import bends_between, carried_bases
 from groundstation.survey.adjustment.starting_point import first_start
 
 Array = npt.NDArray[np.float64]
 WIDE_FORCE, WIDE_TILT, WIDE_TURN, WIDE_DEPTH = 1.0, 0.2, 3.0, 10.0  # m/s^2, rad, rad, m before a blunder is found
 BENT = (*BY_DEPTH, *BY_TILT, BlunderKind.HOLE_MOVED)  # whose columns are others once the hole stands right
+NOT_SOUGHT = (*KNOWN_SIZE, BlunderKind.COLLAR_WRONG)  # put right in the looks, and left open in the path
 ROUNDS = 4
 SETTLED, STRAIGHT = 0.1, 0.01  # standard deviations, and rad or m, of a turn or depth that is found in addition
 
@@ -71,7 +74,9 @@ def adjust_with(
 ) -> TakenIn:
     """Adjust a hole with blunders taken in; without any it is ``adjust_hole``."""
     looks = put_right(looks, blunders)
-    sought = [one for one in blunders if one.kind not in KNOWN_SIZE]
+    told, sought = path, [one for one in blunders if one.kind not in NOT_SOUGHT]
+    if len(sought) < len(blunders) and any(one.kind is BlunderKind.COLLAR_WRONG for one in blunders):
+        path = untold_collar(path)
     now = replace(start or first_start(looks, string, path), extra=np.zeros(0))
     is_turn, is_bent = (_is_of(sought, kinds) for kinds in (BY_TURN, BENT))
     sizes, turned = np.zeros(len(is_turn)), looks
@@ -86,9 +91,25 @@ def adjust_with(
             break
         now = replace(found.now, extra=np.zeros(0))
         turned = _turned_back(looks, run, sought, sizes)
-    shown = iter(_places(sought))
-    slices = [slice(0, 0) if one.kind in KNOWN_SIZE else next(shown) for one in blunders]
-    return TakenIn(found, tuple(sizes[one] for one in slices), tuple(cov[one, one] for one in slices))
+    slices = places_among_further(blunders)
+    shares = [_share_of(one, at, sizes, cov, found, told) for one, at in zip(blunders, slices, strict=True)]
+    return TakenIn(found, tuple(size for size, _ in shares), tuple(share for _, share in shares))
+
+
+def _share_of(
+    one: Hypothesis, at: slice, sizes: Array, cov: Array, found: Adjusted, told: PathPrior
+) -> tuple[Array, Array]:
+    """Size and covariance of one blunder; empty where the size is known."""
+    if one.kind is BlunderKind.COLLAR_WRONG:
+        ends = np.stack([found.now.tangents[0], told.collar])
+        return bends_between(ends, found.bases[:1].repeat(2, axis=0))[0], found.covs[0, :2, :2]
+    return sizes[at], cov[at, at]
+
+
+def places_among_further(blunders: Sequence[Hypothesis]) -> list[slice]:
+    """Where each blunder stands among the further unknowns; empty of one whose size is known."""
+    shown = iter(_places([one for one in blunders if one.kind not in NOT_SOUGHT]))
+    return [slice(0, 0) if one.kind in NOT_SOUGHT else next(shown) for one in blunders]
 
 
 def _is_of(sought: Sequence[Hypothesis], kinds: Sequence[BlunderKind]) -> npt.NDArray[np.bool_]:
@@ -167,7 +188,7 @@ def deviance_of(found: Adjusted) -> float:
         size += _log_size(solution.cov[core:, core:])
     before = found.string.play_std**2
     play = PLAY_KNOWN_AS * (np.log(now.play_var) + before / now.play_var)
-    return squares + size + float(play) if looks else 0.0
+    return squares + size + float(play) + curvature_deviance(now, found.path.curvature_std**2) if looks else 0.0
 
 
 def path_squares(found: Adjusted) -> tuple[float, float]:

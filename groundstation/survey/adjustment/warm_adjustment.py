@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from groundstation.survey.adjustment.kernels.carried_bases import carry_bases
 from groundstation.survey.adjustment.kernels.free_parts import free_parts
 from groundstation.survey.adjustment.kernels.observations import add_looks, linearise_looks
 from groundstation.survey.adjustment.kernels.path_elimination import (
@@ -22,6 +23,7 @@ def warm_adjustment() -> None:
     first, one, width = np.zeros(1, np.intp), np.ones(1), 8
     forces, tangents, bases = np.array([[0.0, 0.0, -9.8]]), np.array([[0.0, 0.0, 1.0]]), np.zeros((1, 2, 3))
     bases[0, 0, 0] = bases[0, 1, 1] = 1.0
+    carry_bases(tangents, bases)
     jacobians, weights, residuals = np.zeros((1, 3, 9)), np.zeros((1, 3, 3)), np.zeros((1, 3))
     linearise_looks(
         first, first, first, forces, one, np.zeros(1), one, tangents, bases, np.zeros((1, 6)), np.zeros(1), 9.8, 1e-6,

@@ -90,6 +90,7 @@ class Trajectory:
     ) -> None:
         self.method = method
         self._wander = wander
+        self._driven = NOTHING  # (s,), variance by which each leg is driven over that of the curvature; 1 of the others
         self._keeps_columns = keeps_columns
         first = collar or Direction(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
         self._rows = np.zeros(FEWEST, ROW)
@@ -235,6 +236,22 @@ class Trajectory:
         if changed:
             self._draw(changed[0])
 
+    def bend_as(self, wander: LegWander, driven: Array) -> None:
+        """Take another wander of the path, for what is drawn from now on.
+
+        Parameters
+        ----------
+        driven : (s,), of each leg from the collar down the variance by which it is driven over that of the curvature
+        """
+        self._wander, self._driven = wander, driven
+
+    def _moments(self, begin: int, lengths: Array) -> Array:
+        """Moments (n, 4) of the path over legs (n,), m, from the one below a place on."""
+        found = self._wander.moments(lengths)
+        driven = self._driven[begin : begin + len(found)]
+        found[: len(driven), [0, 2]] *= driven[:, None]  # of itself, and of it with the curvature at its end
+        return found
+
     def at(self, md: float) -> TrajectoryPoint:
         """Point at a depth (m): on the arc between two stations, with its own covariance.
 
@@ -263,7 +280,10 @@ class Trajectory:
         weights = (0.5 * (sums.length + leg * f * (2.0 - f)), 0.5 * leg * f * f)
         by_depth = (upper["along"] - f * along, f * along)
         shared, cov = sums.passed, sums.own + upper["kinks"] + upper["path"]
-        cov = cov + self._wander.grown(float(upper["memory"]), self._wander.moment(leg, f)) * across_of(along)
+        moment = self._wander.moment(leg, f)
+        driven = float(self._driven[k]) if k < len(self._driven) else 1.0
+        moment = moment._replace(variance=driven * moment.variance)
+        cov = cov + self._wander.grown(float(upper["memory"]), moment) * across_of(along)
         for row, own, weight, moved in zip((upper, lower), (k, k + 1), weights, by_depth, strict=True):
             cov = cov + weight**2 * row["own"] + float(row["depth_var"]) * np.outer(moved, moved)
             shared = add_shared_errors(shared, weight * self._tangent_columns(own))
@@ -331,7 +351,7 @@ class Trajectory:
         rows = self._rows[begin:end]
         legs = self._legs(rows)
         rows["position"] = np.add.accumulate(np.concatenate([rows["position"][:1], legs]))
-        more = self._go_along(rows, legs)
+        more = self._go_along(begin, rows, legs)
         followed = self._follow(self._sums, begin, end - 1, with_columns=self._keeps_columns)
         rows["cov"][1:] = followed.covs + more
         self._sums = followed.sums
@@ -341,8 +361,8 @@ class Trajectory:
         else:
             self._kept += [UNKNOWN] * (len(rows) - 1)
 
-    def _go_along(self, rows: npt.NDArray[np.void], legs: Array) -> Array:
-        """Compute what depths and the path between stations come to, from the first of some rows on: (n, 3, 3), m^2."""
+    def _go_along(self, begin: int, rows: npt.NDArray[np.void], legs: Array) -> Array:
+        """Compute what depths and the path between stations come to, from rows at a place on: (n, 3, 3), m^2."""
         from groundstation.survey.well.kernels.position_errors import (
             follow_legs,  # reading alone needs no compiler
         )
@@ -351,7 +371,7 @@ class Trajectory:
         alongs, memories = rows["along"].copy(), rows["memory"].copy()
         kinks, path = rows["kinks"].copy(), rows["path"].copy()
         follow_legs(
-            legs, lengths, rows["depth_var"].copy(), self._wander.moments(lengths), self._wander.std, alongs, memories,
+            legs, lengths, rows["depth_var"].copy(), self._moments(begin, lengths), self._wander.std, alongs, memories,
             kinks, path, more,
         )  # fmt: skip
         rows["along"], rows["memory"], rows["kinks"], rows["path"] = alongs, memories, kinks, path

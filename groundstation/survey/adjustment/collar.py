@@ -1,0 +1,68 @@
+"""The direction at the collar as it was told, beside what the stations below say of it.
+
+No tube looks at the collar, and the hole may bend down to the first station as any path does. What the stations say of
+it is their directions, carried up by what is known of the path; against that what was told is one more reading.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.equations import KNOWN, STATE, leg_steps
+from groundstation.survey.adjustment.looks import PathPrior
+from groundstation.survey.adjustment.scores import best_sizes
+from groundstation.survey.adjustment.sphere import bends_between
+
+Array = npt.NDArray[np.float64]
+WIDE_COLLAR = 0.5  # rad, of a collar that was told wrong, before the stations tell it
+
+
+@dataclass(frozen=True, slots=True)
+class CollarDeparture:
+    """By how much (2,), rad, what was told stands off what the stations say, with its covariance (2, 2).
+
+    ``squares`` is chi-square of two degrees of freedom in an honest hole, or zero of none where ``told`` is: nothing
+    beside it tells the collar.
+    """
+
+    size: Array
+    cov: Array
+    squares: float
+    told: int
+
+
+def collar_departure(found: Adjusted) -> CollarDeparture:
+    """Departure of the collar as it was told, in the axes of the collar of an adjustment.
+
+    What the first station says, direction and curvature, is compared with what the collar leads to down a leg that
+    bends as the hole does on the whole: were it taken to bend as sharply as it seems to, no collar would ever be wrong.
+    """
+    bases, now = found.bases, found.now
+    if len(now.tangents) < 2:
+        return CollarDeparture(np.zeros(2), np.eye(2), 0.0, 0)
+    go, rigid = leg_steps(found.path)
+    at_collar = np.zeros((STATE, STATE))
+    at_collar[:2, :2] = bases[0] @ found.path.collar_cov @ bases[0].T + KNOWN * np.eye(2)
+    at_collar[2:, 2:] = found.path.curvature_std**2 * np.eye(2)
+    led_to, by_leg = go[0] @ at_collar @ go[0].T, np.asarray(np.linalg.inv(rigid[0]), np.float64)
+    known = np.asarray(np.linalg.inv(found.covs[1]), np.float64)
+    ends = np.stack([now.tangents[0], found.path.collar, now.tangents[0], now.tangents[1]])
+    to_told, _, to_station = bends_between(ends, bases[:1].repeat(4, axis=0))
+    pulled = known @ np.concatenate([to_station - to_told, now.curvatures[1]])
+    # the station without what it has from the collar, which leads to no bend and no curvature
+    own = known - np.linalg.inv(led_to + now.leg_vars[0] * by_leg)
+    weight = np.linalg.inv(np.eye(STATE) + own @ (led_to + now.curvature_var * by_leg))
+    down = go[0][:, :2]
+    free = down.T @ weight @ own @ down
+    sizes, _, told, squares = best_sizes(-(down.T @ weight @ pulled)[None], free[None], free[None])
+    return CollarDeparture(sizes[0], np.asarray(np.linalg.pinv(free), np.float64), float(squares[0]), int(told[0]))
+
+
+def untold_collar(path: PathPrior) -> PathPrior:
+    """What is known of a path without what was told of its collar."""
+    across = np.eye(3) - np.outer(path.collar, path.collar)
+    return replace(path, collar_cov=path.collar_cov + WIDE_COLLAR**2 * across)

@@ -1,0 +1,65 @@
+"""How sharply a hole bends, learnt from its own directions: of the hole as a whole, and leg by leg.
+
+A curvature that wanders is driven by a noise of one size, so that a hole which is steered back in a single leg would
+contradict whatever reads its lowest station. The noise of each leg has therefore a variance of its own about that of
+the hole, which in turn is about what was known before: the tails are those of Student's distribution.
+Source: Foerstner 1979, with a prior at each of the two levels; Lange, Little and Taylor, "Robust Statistical Modeling
+Using the t Distribution", JASA 84 (1989).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.adjustment.equations import leg_steps, path_departures
+
+if TYPE_CHECKING:
+    from groundstation.survey.adjustment.adjusted import Adjusted
+    from groundstation.survey.adjustment.looks import StartingPoint
+
+Array = npt.NDArray[np.float64]
+HOLE_KNOWN_AS = 6.0  # directions that the size of the hole's curvature before them counts for
+LEG_KNOWN_AS = 4.0  # likewise of one leg, that of the hole: the degrees of freedom of its tails
+LEAST = 1e-12  # rad^2/m^2
+
+
+def learnt_curvature(found: Adjusted) -> tuple[float, Array]:
+    """Variance (rad^2/m^2) of the curvature of the hole, and that by which each leg (s,) is driven.
+
+    It is a step of iteration. The departures of the legs are weighed as they stand, so the two settle together.
+    """
+    before, legs = found.path.curvature_std**2, found.now.leg_vars
+    if not len(legs):
+        return before, legs
+    go, rigid = leg_steps(found.path)
+    off = path_departures(found.path, found.now, found.linear.bases, go)
+    seen = np.einsum("ka,kab,kb->k", off, rigid, off)
+    free = off.shape[1] - np.einsum("kab,kba->k", rigid, departure_covs(found, go)) / legs
+    weights = found.now.curvature_var / legs
+    at_collar = found.now.curvatures[0]
+    seen_at_all = float(weights @ seen) + float(at_collar @ at_collar)
+    free_at_all = float(free.sum()) + 2.0 - float(np.trace(found.covs[0, 2:, 2:])) / found.now.curvature_var
+    whole = (HOLE_KNOWN_AS * before + seen_at_all) / (HOLE_KNOWN_AS + free_at_all)
+    each = (LEG_KNOWN_AS * whole + seen) / (LEG_KNOWN_AS + free)
+    return max(whole, LEAST), np.maximum(each, LEAST)
+
+
+def curvature_deviance(now: StartingPoint, before: float) -> float:
+    """Minus twice the logarithm of how likely the variances are beforehand, but for a constant."""
+    by_leg = np.log(now.leg_vars / now.curvature_var) + now.curvature_var / now.leg_vars - 1.0
+    of_hole = np.log(now.curvature_var) + before / now.curvature_var
+    return float(LEG_KNOWN_AS * by_leg.sum() + HOLE_KNOWN_AS * of_hole)
+
+
+def departure_covs(found: Adjusted, go: Array) -> Array:
+    """Covariances (s, 4, 4) of what each leg departs by from going on as the station above it does."""
+    solution, own = found.solution, found.own_covs
+    lower = np.tril(solution.diagonal[1:])  # what is above it is left over
+    carried = -np.linalg.solve(np.swapaxes(lower, 1, 2), solution.tied[1:])
+    lever = carried - go  # of the state above, where what stations have in common is known
+    left = own[1:] - carried @ own[:-1] @ np.swapaxes(carried, 1, 2)
+    in_common = found.columns[1:] - go @ found.columns[:-1]
+    return np.asarray(left + lever @ own[:-1] @ np.swapaxes(lever, 1, 2) + in_common @ np.swapaxes(in_common, 1, 2))
