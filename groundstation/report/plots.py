@@ -32,7 +32,7 @@ from groundstation.report.style import (
     tidy_ticks,
 )
 from groundstation.survey.requests.survey_answer import SurveyAnswer
-from groundstation.survey.wall.column_deviation import ColumnDesign
+from groundstation.survey.wall.column_deviation import ColumnDesign, axis_deviations
 from groundstation.survey.well.ellipsoid import coverage_radius, probability_of
 
 Array = npt.NDArray[np.float64]
@@ -114,9 +114,8 @@ def _off_axis(position: Array, design: ColumnDesign | None) -> tuple[float, floa
     """Distance (m) from the design axis and its tolerance (m) there."""
     if design is None:
         return 0.0, math.inf
-    offset = position - np.array(design.head)
-    across = design.across @ offset
-    return math.hypot(across[0], across[1]), design.tolerance.at(max(float(offset @ design.axis), 0.0))
+    found = axis_deviations(np.zeros(1), position[None], np.zeros((1, 3, 3)), design)[0]
+    return found.size, found.limit
 
 
 def _plan(axes: Axes, positions: Array, covs: Array, sigma: float, design: ColumnDesign | None, scale: float) -> None:
@@ -128,13 +127,12 @@ def _plan(axes: Axes, positions: Array, covs: Array, sigma: float, design: Colum
             axes, scale * positions[k, 1::-1], scale**2 * covs[k, 1::-1, 1::-1], sigma, fc="none", ec=SERIES[0]
         )
     if design is not None:
-        centre = np.array(design.head) + design.length * design.axis
         angle = np.linspace(0.0, math.tau, 121)
-        around = np.stack([np.cos(angle), np.sin(angle)], axis=-1) @ design.across
-        circle = scale * (centre + design.tolerance.at(design.length) * around)
+        around = np.stack([np.cos(angle), np.sin(angle)], axis=-1) @ design.end.across
+        circle = scale * (design.end.point + design.end.limit * around)
         axes.add_patch(Polygon(circle[:, 1::-1], fc="none", ec=GREY, ls="--", lw=1.0, gid="tolerance"))
-        axes.plot(scale * np.array([design.head[1], centre[1]]), scale * np.array([design.head[0], centre[0]]), "-.+",
-                  color=GREY, lw=1.0)  # fmt: skip
+        course = scale * design.points_at(np.linspace(0.0, design.length, 2 if design.plan is None else 25))
+        axes.plot(course[:, 1], course[:, 0], "-.+", color=GREY, lw=1.0, markevery=[0, -1])
     axes.autoscale_view()
     axes.margins(0.08)
 
@@ -173,10 +171,10 @@ def _sections(
 
 def _section_design(axes: Axes, design: ColumnDesign, c: int, scale: float) -> None:
     along = np.linspace(0.0, design.length, 25)
-    centre = np.array(design.head) + along[:, None] * design.axis
+    centre, across = design.points_at(along), design.across_at(along)
     # outermost points of the circle around the axis in the direction of this section
-    out = design.across.T @ design.across[:, c]
-    reach = np.array([design.tolerance.at(s) for s in along])[:, None] * out / float(np.linalg.norm(out))
+    out = np.einsum("kai,ka->ki", across, across[:, :, c])
+    reach = np.array([design.tolerance.at(s) for s in along])[:, None] * out / np.linalg.norm(out, axis=1)[:, None]
     axes.plot(scale * centre[:, c], centre[:, 2], "-.", color=GREY, lw=1.0)
     for edge in (centre - reach, centre + reach):
         axes.plot(scale * edge[:, c], edge[:, 2], "--", color=GREY, lw=1.0)

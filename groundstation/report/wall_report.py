@@ -12,8 +12,9 @@ from groundstation.report.column_report import ColumnRecord, ReportSite, column_
 from groundstation.report.document import Document, Origin, ReportSection, report_pdf
 from groundstation.report.plots_wall import wall_figure
 from groundstation.report.style import svg_of
+from groundstation.survey.wall.column_errors import survey_errors
 from groundstation.survey.wall.column_state import ColumnState
-from groundstation.survey.wall.wall_columns import state_words, survey_errors
+from groundstation.survey.wall.wall_columns import state_words
 from groundstation.survey.wall.wall_file import Wall
 from groundstation.survey.wall.wall_joints import worst_depths, worst_joint
 from groundstation.survey.wall.wall_verdict import Judgement, WallVerdict, joint_name

@@ -1,4 +1,4 @@
-"""Angles of directions in one turn, for numbers and arrays alike; rad."""
+"""Angles of directions in one turn, for numbers and arrays alike, and axes across directions; rad."""
 
 from __future__ import annotations
 
@@ -6,6 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+UPWARD = 1e-12  # of 1 + cos I, of a direction that is straight up
 
 
 def wrap_angle(angle: Any) -> Any:
@@ -17,3 +21,18 @@ def wrap_azimuth(angle: Any) -> Any:
     """Angle in [0, 2 pi)."""
     turned = np.mod(angle, math.tau)
     return np.where(turned < math.tau, turned, 0.0)
+
+
+def planes_across(tangents: Array) -> Array:
+    """Two unit vectors (..., 2, 3) across directions (..., 3): north and east, tilted with the direction.
+
+    They are high side and right turned back by the azimuth, so that they stay as they are where a plan passes the
+    vertical. Straight up they are north and east again, and turn with the azimuth all about it.
+    """
+    x, y = tangents[..., 0], tangents[..., 1]
+    apart = np.maximum(1.0 + tangents[..., 2], UPWARD)
+    found = np.empty((*tangents.shape[:-1], 2, 3))
+    found[..., 0, 0], found[..., 1, 1] = 1.0 - x * x / apart, 1.0 - y * y / apart
+    found[..., 0, 1] = found[..., 1, 0] = -x * y / apart
+    found[..., 0, 2], found[..., 1, 2] = -x, -y
+    return found

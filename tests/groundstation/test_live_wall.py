@@ -14,7 +14,7 @@ from groundstation.config import GroundConfig
 from groundstation.errors import SurveyError
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.wall_views import survey_of
-from groundstation.survey.wall.wall_columns import ColumnSurvey
+from groundstation.survey.wall.column_plans import ColumnSurvey
 
 pytestmark = pytest.mark.slow
 

@@ -19,8 +19,9 @@ from groundstation.service.hole.resolved_stops import ResolvedStop, ResolvedStop
 from groundstation.service.hole.resolving import Resolver
 from groundstation.service.hole.station import StationStops
 from groundstation.survey.fusion.fusion import Weighting
-from groundstation.survey.fusion.resolve import Quality, angle_stds, direction_angles
+from groundstation.survey.fusion.resolve import Quality, direction_angles
 from groundstation.survey.fusion.shared import SharedErrors
+from groundstation.survey.fusion.sphere_direction import stds_of_directions
 from groundstation.survey.fusion.trust_level import Trust
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 
@@ -51,10 +52,13 @@ def stops_of(tube: int, number: int, at: float, imus: int = 1) -> ResolvedStops:
 
 
 def same(one: ResolvedStop, other: ResolvedStop) -> bool:
-    arrays = ("lean", "cov", "shared", "causes", "places")
-    plain = [field.name for field in fields(ResolvedStop) if field.name not in arrays]
-    return all(getattr(one, name) == getattr(other, name) for name in plain) and all(
-        np.array_equal(getattr(one, name), getattr(other, name)) for name in (*arrays, "information", "total_cov")
+    arrays = ("causes", "places")
+    plain = [field.name for field in fields(ResolvedStop) if field.name not in (*arrays, "direction")]
+    of_direction = ("tangent", "own", "shared", "tangent_cov")
+    return (
+        all(getattr(one, name) == getattr(other, name) for name in plain)
+        and all(np.array_equal(getattr(one, name), getattr(other, name)) for name in arrays)
+        and all(np.array_equal(getattr(one.direction, name), getattr(other.direction, name)) for name in of_direction)
     )
 
 
@@ -84,7 +88,7 @@ def test_what_cannot_be_weighed_is_told_before_it_is_inserted() -> None:
     stops = stops_of(1, 1, 5.0)
     stops.rows["cov"] = stops.rows["causes"] = 0.0
     with pytest.raises(np.linalg.LinAlgError):
-        stops.weigh()
+        stops.check_weights()
 
 
 def test_a_departure_is_kept_until_an_earlier_stop_comes() -> None:
@@ -112,11 +116,12 @@ def test_what_is_shown_of_many_surveys_is_what_each_of_them_says() -> None:
     rows = [table.append_stop(one, 0) for one in found]
     shown = plain_answer(measurement_rows(table, rows[::-1], [3, 1, 1, 2, 9]))
     for view, one, station in zip(shown, known[::-1], (3, 1, 1, 2, 9), strict=True):
-        inclination, azimuth = direction_angles(one.lean, one.down)
-        stds = angle_stds(one.lean, one.down, one.total_cov)
+        inclination, azimuth = direction_angles(one.direction.lean, one.direction.down)
+        (stds,) = stds_of_directions([one.direction])
         assert (view["seq"], view["tube"], view["station"], view["md_m"]) == (one.number, one.tube, station, one.md)
         assert (view["inclination_deg"], view["azimuth_deg"]) == (math.degrees(inclination), math.degrees(azimuth))
-        assert (view["sigma_inclination_deg"], view["sigma_azimuth_deg"]) == tuple(map(math.degrees, stds))
+        shown_stds = (view["sigma_inclination_deg"], view["sigma_azimuth_deg"])
+        assert shown_stds == pytest.approx(tuple(map(math.degrees, stds)), rel=1e-12)
         assert view["forces_mps2"] == [list(force) for force in one.forces]
         assert view["flags"] == (["restored"] if one.flags else [])
         assert view["trust"] == one.trust.name.lower()

@@ -11,8 +11,8 @@ from hand_fed import Rig
 from groundstation.errors import SurveyError
 from groundstation.service.answers.wall_views import survey_of
 from groundstation.service.hole.live_wall import LiveWall
+from groundstation.survey.wall.column_plans import ColumnSurvey
 from groundstation.survey.wall.judged_wall import judge_wall
-from groundstation.survey.wall.wall_columns import ColumnSurvey
 from groundstation.survey.wall.wall_file import Wall, read_wall
 from groundstation.survey.wall.wall_verdict import Judgement
 
@@ -29,6 +29,7 @@ class Case:
     keys: str = ""
     inclination_deg: float = 0.0
     azimuth_deg: float = 0.0
+    build_deg_per_m: float = 0.0  # of a plan
 
 
 def ring(count: int) -> dict[str, tuple[float, float, float]]:
@@ -43,6 +44,7 @@ CASES = {
     "raked": Case(LINE, "H2", inclination_deg=15.0),
     "raked along the wall": Case(LINE, "H3", inclination_deg=15.0, azimuth_deg=90.0),
     "horizontal": Case(LINE, "H2", inclination_deg=90.0, azimuth_deg=0.0),
+    "planned": Case(LINE, "H2", inclination_deg=5.0, azimuth_deg=20.0, build_deg_per_m=3.0),
     "ring": Case(ring(8), "R3", 'layout = "shaft"\n'),
     "grid": Case(
         {f"G{r}{c}": (SPACING * r, SPACING * c, 0.0) for r in range(3) for c in range(3)}, "G11",
@@ -55,18 +57,19 @@ def surveyed(case: Case, name: str, off_deg: float) -> ColumnSurvey:
     """A column a little off its design, one way or another by its name; ``off_deg`` more to the right."""
     md = np.arange(0.0, LENGTH + 1e-9, STEP)
     turn = 0.03 * (sum(map(ord, name)) % 7 - 3)
-    inclination = math.radians(case.inclination_deg + 0.02 * turn)
-    s, c = math.sin(inclination), math.cos(inclination)
+    inclination = np.radians(case.inclination_deg + 0.02 * turn + case.build_deg_per_m * md)
+    s, c = np.sin(inclination), np.cos(inclination)
     azimuth = math.radians(case.azimuth_deg)
     right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
-    tangent = np.array([s * math.cos(azimuth), s * math.sin(azimuth), c]) + math.radians(turn + off_deg) * right
-    tangent /= np.linalg.norm(tangent)
-    angles = math.acos(tangent[2]), math.atan2(tangent[1], tangent[0])
-    axes = np.linalg.qr(np.column_stack([tangent, right, [0.3, 0.1, 0.2]]))[0]
+    tangents = np.stack([s * math.cos(azimuth), s * math.sin(azimuth), c], axis=1)
+    tangents += math.radians(turn + off_deg) * right
+    tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+    angles = np.arccos(tangents[:, 2]), np.arctan2(tangents[:, 1], tangents[:, 0])
+    axes = np.linalg.qr(np.column_stack([tangents[0], right, [0.3, 0.1, 0.2]]))[0]
     sizes = np.outer(np.maximum(md, 1e-3) / LENGTH, [0.01, 0.02, 0.015])
     covs = np.einsum("ij,nj,kj->nik", axes, sizes**2, axes)
     covs[0] = 0.0
-    return ColumnSurvey(md, np.full(len(md), angles[0]), np.full(len(md), angles[1]), covs=covs)
+    return ColumnSurvey(md, *angles, covs=covs)
 
 
 def written(folder: Path, case: Case, holes: dict[str, ColumnSurvey], with_covs: bool) -> Path:
@@ -81,10 +84,14 @@ def written(folder: Path, case: Case, holes: dict[str, ColumnSurvey], with_covs:
             values = [float(md), math.degrees(i), math.degrees(a), *map(float, told)]
             rows.append(",".join([name, *(f"{value:.17g}" for value in values)]))
     (folder / "stations.csv").write_text("\n".join(rows) + "\n")
-    path = folder / "wall.toml"
+    path, axis = folder / "wall.toml", f"inclination_deg = {case.inclination_deg}\nazimuth_deg = {case.azimuth_deg}\n"
+    if case.build_deg_per_m:
+        leg = f"[[leg]]\nlength_m = {LENGTH}\nbuild_deg_per_m = {case.build_deg_per_m}\n"
+        (folder / "plan.toml").write_text(axis + leg)
+    design = 'plan = "plan.toml"\n' if case.build_deg_per_m else f"length_m = {LENGTH}\n{axis}"
     path.write_text(
         'name = "doors"\nradius_m = 0.6\nthickness_m = 0.8\nheads = "heads.csv"\nstations = "stations.csv"\n'
-        f"length_m = {LENGTH}\ninclination_deg = {case.inclination_deg}\nazimuth_deg = {case.azimuth_deg}\n{case.keys}"
+        f"{design}{case.keys}"
     )
     return path
 

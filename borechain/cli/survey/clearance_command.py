@@ -51,6 +51,18 @@ clearance_options = gather_options(
         "--sigma-ahead-m", type=click.FloatRange(0.0), default=0.5, show_default=True, help="Of projecting ahead."
     ),
     click.option("--margin-m", type=click.FloatRange(0.0), default=0.3, show_default=True, help="Surface margin."),
+    click.option(
+        "--curvature-sigma-deg-per-m",
+        type=click.FloatRange(0.0),
+        help="Of the paths between stations: 0.3 for relay, none for other instruments by default.",
+    ),
+    click.option(
+        "--curvature-length-m",
+        type=click.FloatRange(0.0, min_open=True),
+        default=20.0,
+        show_default=True,
+        help="Over which that curvature is forgotten.",
+    ),
     *site_options("Magnetic field of the site.", "Of magnetic from true north."),
     site=SiteFigures,
     request=ClearanceRequest,

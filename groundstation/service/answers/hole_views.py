@@ -28,7 +28,8 @@ from groundstation.service.answers.shapes.hole_shapes import (
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.hole.station import SurveyStation
 from groundstation.service.hole.surveyed_hole import SurveyedHole
-from groundstation.survey.fusion.resolve import angle_stds_of_all, direction_angles
+from groundstation.survey.fusion.resolve import direction_angles
+from groundstation.survey.fusion.sphere_direction import stds_of_directions
 from groundstation.survey.well.ellipsoid import Ellipse, coverage_radius, ellipsoid_axes, plan_ellipses
 from groundstation.survey.well.trajectory import TrajectoryPoint
 
@@ -77,8 +78,7 @@ def direction_values(hole: SurveyedHole, chosen: Sequence[SurveyStation]) -> lis
     if not chosen:
         return []
     found = [hole.direction_of(s) for s in chosen]
-    downs, covs = [one.down for one in found], np.array([one.total_cov for one in found])
-    stds = angle_stds_of_all(np.array([one.lean for one in found]), downs, covs)
+    stds = stds_of_directions(found)
     return [
         direction_value(s, direction_angles(one.lean, one.down), own, hole.transport_of(s))
         for s, one, own in zip(chosen, found, stds, strict=True)

@@ -28,7 +28,8 @@ from groundstation.service.answers.shapes.hole_shapes import (
 from groundstation.service.answers.streamed_rows import Parameters, is_streamed, window_limits
 from groundstation.service.answers.string_views import flag_names
 from groundstation.service.hole.resolved_stops import NO_NUMBER, ResolvedStops, forces_of
-from groundstation.survey.fusion.resolve import Quality, angle_stds_of_all, direction_angles
+from groundstation.survey.fusion.resolve import Quality, direction_angles
+from groundstation.survey.fusion.sphere_direction import stds_of_angles
 from groundstation.survey.fusion.trust_level import Trust
 from telemetry.messages import NodeFlag
 
@@ -92,9 +93,8 @@ def measurement_rows(surveys: ResolvedStops, rows: Sequence[int], stations: Sequ
     if not rows:
         return []
     table = surveys.rows[rows]
-    downs = table["down"].tolist()
-    pointing = np.array([direction_angles(*way) for way in zip(table["lean"], downs, strict=True)])
-    stds = np.array(angle_stds_of_all(table["lean"], downs, surveys.covs(rows)))
+    pointing = np.array([direction_angles(way[:2], float(way[2])) for way in table["tangent"]])
+    stds = np.array(stds_of_angles(table["tangent"], surveys.covs(rows)))
     columns = {
         "seq": table["number"],
         "station": np.array(stations),

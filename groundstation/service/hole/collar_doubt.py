@@ -7,8 +7,10 @@ import math
 import numpy as np
 
 from groundstation.service.hole.surveyed_hole import SurveyedHole
+from groundstation.survey.bearings import planes_across
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import direction_angles
+from groundstation.survey.fusion.sphere_direction import on_sphere
 
 CONTRADICTS = 4.0  # sigmas
 
@@ -23,8 +25,10 @@ def collar_doubt(hole: SurveyedHole, curvature_std: float) -> str:
         return ""
     first, collar = station.fused(Weighting.BAYES), hole.collar  # an adjusted hole is adjusted to the collar too
     bend = (curvature_std * station.md) ** 2
-    apart = first.lean - collar.lean
-    cov = first.total_cov + collar.total_cov + bend * np.eye(2)
+    here, there = on_sphere(first), on_sphere(collar)
+    axes = planes_across(there.tangent)
+    apart = axes @ (here.tangent - there.tangent)
+    cov = axes @ (here.tangent_cov + there.tangent_cov) @ axes.T + bend * np.eye(2)
     sigmas = math.sqrt(float(apart @ np.linalg.solve(cov, apart)))
     if sigmas < CONTRADICTS:
         return ""

@@ -23,10 +23,10 @@ from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
+from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Direction
-from groundstation.survey.fusion.shared import Packed, SharedErrors
-from groundstation.survey.fusion.sphere_direction import SphereDirection, tangent_errors
-from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
+from groundstation.survey.fusion.shared import SharedErrors
+from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR, SphereDirection, tangent_errors
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
 from groundstation.survey.fusion.trust_level import Trust
 

@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from groundstation.errors import SurveyError
+from groundstation.survey.wall.column_plans import ColumnPlan, ColumnStatus, ColumnSurvey
 from groundstation.survey.wall.judged_wall import judge_wall, part_around
-from groundstation.survey.wall.wall_columns import ColumnPlan, ColumnStatus, ColumnSurvey, build_wall
+from groundstation.survey.wall.wall_columns import build_wall
 from groundstation.survey.wall.wall_file import Wall, read_wall
 from groundstation.survey.wall.wall_verdict import Judgement
 

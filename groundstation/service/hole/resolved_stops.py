@@ -14,10 +14,12 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.fusion.fusion import Stack
-from groundstation.survey.fusion.resolve import Direction, Quality
-from groundstation.survey.fusion.shared import CAUSES, Places, columns_of, weights_of
-from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
+from groundstation.survey.bearings import planes_across
+from groundstation.survey.fusion.packed import Packed
+from groundstation.survey.fusion.resolve import Quality
+from groundstation.survey.fusion.shared import CAUSES, Places, columns_of
+from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR, SphereDirection
+from groundstation.survey.fusion.sphere_fusion import Stack
 from groundstation.survey.fusion.trust_level import Trust
 from telemetry.messages import NodeFlag
 
@@ -34,10 +36,8 @@ ROW: Final = np.dtype(
         *((name, np.uint32) for name in ("tube", "width", "chain")),
         *((name, np.uint8) for name in ("trust", "quality")),
         *((name, np.float64) for name in ("at", "md", "yaw", "yaw_var", "systematic_var", "force_var", "settle_time")),
-        ("lean", np.float64, 2),
-        ("down", np.float64),
+        ("tangent", np.float64, 3),
         ("cov", np.float64, (2, 2)),
-        ("information", np.float64, (2, 2)),
         ("causes", np.float64, (2, CAUSES)),
         ("departed", np.float64, 2),
         ("departure", np.float64),
@@ -46,12 +46,13 @@ ROW: Final = np.dtype(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ResolvedStop(Direction):
+class ResolvedStop:
     """One tube at one stop: the direction that it found, how far that is trusted, and at which depth.
 
-    ``shared`` (2, s) holds the columns of the direction, ``causes`` (2, 5) and ``places`` what they are made of.
+    ``causes`` (3, 5) and ``places`` are what the shared columns of the direction are made of.
     """
 
+    direction: SphereDirection
     tube: int
     sequence: int
     at: float  # s, rig time
@@ -101,7 +102,7 @@ class ResolvedStops:
 
     Attributes
     ----------
-    rows : of the table, some of them not used yet
+    rows : of the table, some of them not used yet; covariance and causes across the direction, see ``planes_across``
     forces : (imus, 3) of each stop as bytes, m/s^2
     places : of the columns of each stop, see ``groundstation.survey.fusion.shared``
     depth_places : of the columns of the depth of each
@@ -116,16 +117,15 @@ class ResolvedStops:
     def __len__(self) -> int:
         return len(self.forces)
 
-    def weigh(self) -> None:
-        """Work out the information of all stops.
+    def check_weights(self) -> None:
+        """Refuse stops that cannot be weighed by the inverse of what they do not know.
 
         Raises
         ------
         numpy.linalg.LinAlgError
-            When one of them cannot be weighed.
+            When one of them has none.
         """
-        rows = self.rows[: len(self.forces)]
-        rows["information"] = weights_of(rows["cov"], rows["causes"], self.places, int(rows["width"].max()))
+        np.linalg.inv(self._covs_across(list(range(len(self.forces)))))
 
     def append_stop(self, other: ResolvedStops, row: int) -> int:
         """Add a stop of another table, from which no departure is known yet; returns its row."""
@@ -164,19 +164,28 @@ class ResolvedStops:
             return np.asarray(np.frombuffer(b"".join(kept)).reshape(len(kept), -1, AXES).mean(axis=1))
         return np.array([np.frombuffer(one).reshape(-1, AXES).mean(axis=0) for one in kept])
 
-    def direction(self, row: int) -> Direction:
+    def direction(self, row: int) -> SphereDirection:
         """Direction of the stop in a row, with its columns."""
         found = self.stack([row])
-        return Direction(found.lean[0], float(found.down[0]), found.cov[0], found.shared[0])
+        random, systematic = found.yaw_vars[0].tolist()
+        return SphereDirection(found.tangents[0], found.covs[0], Packed(found.shared[0]), (random, systematic))
 
     def stack(self, numbers: Sequence[int]) -> Stack:
         """Directions of the stops in several rows, side by side."""
         rows, places = self.rows[numbers], [*map(self.places.__getitem__, numbers)]
-        shared = columns_of(rows["causes"], places, int(rows["width"].max()))
-        return Stack(rows["lean"], rows["down"], rows["cov"], rows["information"], shared)
+        back = planes_across(rows["tangent"]).transpose(0, 2, 1)
+        shared = back @ columns_of(rows["causes"], places, int(rows["width"].max()))
+        unknown = UNKNOWN_YAW_VAR * (rows["trust"] == Trust.UNKNOWN_YAW)
+        yaw_vars = np.stack([rows["yaw_var"] + unknown, rows["systematic_var"]], axis=1)
+        return Stack(rows["tangent"], back @ rows["cov"] @ back.transpose(0, 2, 1), shared, yaw_vars)
 
     def covs(self, numbers: Sequence[int]) -> Array:
-        """Covariances (n, 2, 2) of the leans of the stops in several rows, what they share with others included."""
+        """Covariances (n, 3, 3) of the unit vectors of the stops in several rows, with what they share with others."""
+        axes = planes_across(self.rows["tangent"][numbers])
+        return np.asarray(axes.transpose(0, 2, 1) @ self._covs_across(numbers) @ axes)
+
+    def _covs_across(self, numbers: Sequence[int]) -> Array:
+        """The same (n, 2, 2), across the directions."""
         widths = self.rows["width"][numbers]
         covs = self.rows["cov"][numbers]
         for width in np.unique(widths).tolist():
@@ -191,15 +200,15 @@ class ResolvedStops:
         """The stop in a row."""
         row, direction = self.rows[number], self.direction(number)
         return ResolvedStop(
-            direction.lean, direction.down, direction.cov, direction.shared,
+            direction,
             **{name: row[name].item() for name in PLAIN},
             forces=tuple(tuple(force) for force in forces_of(self.forces[number])),
             flags=NodeFlag(int(row["flags"])),
             quality=Quality(int(row["quality"])),
             trust=Trust(int(row["trust"])),
-            causes=row["causes"].copy(),
+            causes=planes_across(row["tangent"]).T @ row["causes"],
             places=self.places[number],
-        )  # fmt: skip
+        )
 
 
 def forces_of(kept: bytes) -> list[list[float]]:

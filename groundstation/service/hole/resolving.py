@@ -16,9 +16,10 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.service.hole.resolved_stops import AXES, NO_NUMBER, ResolvedStops
+from groundstation.survey.bearings import planes_across
 from groundstation.survey.fusion.resolve import check_all, combine_imus, resolve_all
 from groundstation.survey.fusion.shared import SharedErrors, causes_of_all
-from groundstation.survey.fusion.survey_trust import trust_of, with_yaws_of
+from groundstation.survey.fusion.survey_trust import trust_of, with_trusts
 from telemetry.messages import SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
@@ -66,7 +67,7 @@ class Resolver:
         """
         try:
             stops = self._resolve_together(measurements, above)
-            stops.weigh()
+            stops.check_weights()
         except (SurveyError, np.linalg.LinAlgError):
             if len(measurements) == 1:
                 return [None]
@@ -80,7 +81,8 @@ class Resolver:
         self, measurements: Sequence[SurveyMeasurement], above: Sequence[Sequence[int] | None]
     ) -> ResolvedStops:
         stops = ResolvedStops(len(measurements))
-        rows, by_force, by_yaw = stops.rows, np.empty((len(measurements), 2, AXES)), np.empty((len(measurements), 2))
+        rows, by_force = stops.rows, np.empty((len(measurements), AXES, AXES))
+        by_yaw = np.empty((len(measurements), AXES))
         for name, values in zip(COLUMNS, zip(*map(sent_of, measurements), strict=True), strict=True):
             rows[name] = values
         rows["replaces"], rows["departed"], rows["departure"] = NO_NUMBER, 0.0, np.nan
@@ -93,7 +95,7 @@ class Resolver:
         for row, (m, tubes) in enumerate(zip(measurements, above, strict=True)):
             stops.places.append(self._shared.places_of(m.tube, tubes))
             rows["width"][row], rows["chain"][row] = self._shared.count, self._shared.chain_of(m.tube, tubes)
-        rows["causes"] = causes_of_all(
+        rows["causes"] = planes_across(rows["tangent"]) @ causes_of_all(
             by_yaw, by_force, stops.places, rows["systematic_var"], self._mount_var, self._bias_std
         )
         return stops
@@ -103,7 +105,7 @@ class Resolver:
     ) -> tuple[Array, Array]:
         """Directions and quality of measurements with the same number of IMUs, into some rows of a table.
 
-        Returns how their leans change by force (n, 2, 3) and by yaw (n, 2).
+        Returns how their unit vectors change by force (n, 3, 3) and by yaw (n, 3).
         """
         forces = np.array([[*map(force_of, m.imus)] for m in measurements])
         covs = np.array([[*map(force_cov_of, m.imus)] for m in measurements])
@@ -111,9 +113,9 @@ class Resolver:
         combined = combine_imus(forces, covs)
         resolved = resolve_all(*combined, sent["yaw"].tolist(), sent["yaw_var"])
         quality = check_all(forces, covs, combined, self._gravity, sent["samples"], sent["settle_time"], self._noise)
-        whole_vars = (sent["yaw_var"] + sent["systematic_var"]).tolist()
-        found = with_yaws_of(resolved, whole_vars, sent["trust"].tolist())
-        rows["lean"][own], rows["down"][own], rows["cov"][own] = found.lean, found.down, found.cov
+        found = with_trusts(resolved, sent["trust"].tolist())
+        axes = planes_across(found.tangent)
+        rows["tangent"][own], rows["cov"][own] = found.tangent, axes @ found.cov @ axes.transpose(0, 2, 1)
         rows["quality"][own], rows["force_var"][own] = quality, force_vars(covs)
         for row, each in zip(own, forces, strict=True):
             stops.forces[row] = each.tobytes()

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.service.hole.resolved_stops import ResolvedStop, ResolvedStops, Rows
-from groundstation.survey.fusion.fusion import Departure, GrowingBayes, Stack, Weighting, departure_from, fuse_by_scheme
+from groundstation.survey.fusion.fusion import Departure, GrowingBayes, Weighting, departure_from, fuse_by_scheme
 from groundstation.survey.fusion.resolve import Direction
-from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
+from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR, SphereDirection
 from groundstation.survey.fusion.trust_level import Trust
 
 
@@ -233,16 +233,22 @@ class SurveyStation:
         return not self.untrusted and self._all.lacks_one(self.first, self.count)
 
     @staticmethod
-    def add_newest(stations: Sequence[SurveyStation], stops: Stack) -> None:
-        """Add to each of several stations its newest stop, the one that it lacks."""
-        GrowingBayes.grow_each([one._all for one in stations], stops)
+    def fuse_together(stations: Sequence[SurveyStation], table: ResolvedStops) -> None:
+        """Fuse the stops that count of several stations, all of which are believed, in one."""
+        ranges, rows, growing = [], array("I"), []
+        for one in stations:
+            first, end = one.first, len(one.stops.rows)
+            ranges.append((first, end))
+            growing.append(one._all)
+            rows += one.stops.rows[first:end]
+        GrowingBayes.fuse_each(growing, ranges, table.stack(rows))
 
-    def known_before(self, place: int) -> Direction | None:
+    def known_before(self, place: int) -> SphereDirection | None:
         """What the stops before one came to, where that is known."""
         begin = self.first_before(place)
         return self._all.known(begin, place) if begin < place else None
 
-    def _sum_of_all(self, end: int) -> Direction:
+    def _sum_of_all(self, end: int) -> SphereDirection:
         """Direction from the stops before a place since the hole moved, whether they are believed or not."""
         return self._all.of(self.first_before(end), end, self._directions)
 

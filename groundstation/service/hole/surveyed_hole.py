@@ -379,8 +379,7 @@ class SurveyedHole:
         changed, self._touched = [by_depth[md] for md in sorted(by_depth)], {}
         weighting = self._config.weighting
         if weighting is Weighting.BAYES and (grown := [station for station in changed if station.lacks_newest]):
-            newest = self._stops.stack([station.stops.rows[-1] for station in grown])
-            SurveyStation.add_newest(grown, newest)
+            SurveyStation.fuse_together(grown, self._stops)
         return changed
 
     def depth_misfit(self, since: float) -> str:

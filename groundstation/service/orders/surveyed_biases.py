@@ -43,7 +43,7 @@ def _looks_of_hole(hole: SurveyedHole, gravity: float) -> Iterator[Look]:
             where = station.md, station.first_before(place + 1)  # before and after it moved these are two
             force = np.mean(np.array(stop.forces), axis=0)
             var, yaw = stop.force_var, stop.yaw
-            yield look_of(where, stop.tube, stop, (stop.causes, stop.places), force, var, yaw, gravity)
+            yield look_of(where, stop.tube, stop.direction, (stop.causes, stop.places), force, var, yaw, gravity)
 
 
 def _why_not(hole: SurveyedHole, tube: int, state: NodeState | None, mixed: Collection[int]) -> str:

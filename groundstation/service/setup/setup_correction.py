@@ -16,7 +16,7 @@ from groundstation.service.setup.setup_book import Pair, SetupBook
 from groundstation.service.setup.setup_items import JOINT_STD
 from groundstation.service.setup.told_value import DRIVE
 from groundstation.survey.bearings import wrap_azimuth
-from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
+from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR
 from telemetry.frozen import replace
 from telemetry.messages import SurveyMeasurement
 

@@ -23,6 +23,7 @@ from groundstation.survey.fusion.resolve import Direction, resolve_direction
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
 AXES = 3
+LEVEL = 2  # of north, east and down those that a lean has
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,15 +90,15 @@ def look_of(
     Parameters
     ----------
     station, tube, direction : of the tube at the station
-    shared : causes (2, 5) and places, see ``SharedErrors.causes_of``
+    shared : causes (3, 5) and places, see ``SharedErrors.causes_of``
     force, var : (3,) m/s^2, mean specific force, and (m/s^2)^2 of each of its axes
     yaw : rad, with which it was resolved
     gravity : m/s^2, of the site
     """
     size = float(np.linalg.norm(force))
-    causes, places = shared[0], shared[1][:-AXES]
+    causes, places = shared[0][:LEVEL], shared[1][:-AXES]
     columns = np.concatenate([causes[:, :1], np.repeat(causes[:, 1:2], len(places) - 1, axis=1)], axis=1)
-    by_force = resolve_direction(force, var * np.eye(AXES), yaw, 0.0).by_force
+    by_force = resolve_direction(force, var * np.eye(AXES), yaw, 0.0).by_force[:LEVEL]
     return Look(
         station, tube, direction.lean, direction.cov, by_force, columns, places, force / size, size - gravity, var
     )  # fmt: skip

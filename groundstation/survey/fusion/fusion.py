@@ -1,7 +1,7 @@
 """All clusters that were measured at one station, as one direction.
 
-Tube by tube the string passes the same depth. Readings that found the same hole are combined by recursive Bayes, which
-is a running sum of information: order-independent and of constant memory. When the hole moved in between, later
+Tube by tube the string passes the same depth. Readings that found the same hole are combined by recursive Bayes, on the
+sphere (`sphere_fusion`) and not in the plane of the lean: whatever the order. When the hole moved in between, later
 readings count more: weights k^p by their order, or the earlier ones are dropped when neighbouring stations saw the same
 change. What readings share (joints, mounts, biases) is carried with the same weights and never averages away by itself.
 Source: thesis 3.6 and 4.3, eqs. 3.39-3.42.
@@ -11,18 +11,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from enum import Enum
+from operator import attrgetter
 
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.survey.fusion.packed import Packed, packed_each
 from groundstation.survey.fusion.resolve import Direction
-from groundstation.survey.fusion.shared import Fused, Packed, add_shared_errors, packed_each, stack_shared_errors
+from groundstation.survey.fusion.sphere_direction import OWN, PACKED, TANGENT, YAW_VARS, SphereDirection, on_sphere
+from groundstation.survey.fusion.sphere_fusion import Stack, fuse_on_sphere, off_direction
 
 Array = npt.NDArray[np.float64]
 # a departure in the plane is beyond this length as often (4.55 %) as one number is beyond two standard deviations
 DEPARTED = math.sqrt(-2.0 * math.log(math.erfc(math.sqrt(2.0))))
+WIDTH = attrgetter("width")
 QUADRATIC_TO = 4.0  # standard deviations up to which the adaptive scheme is quadratic
 
 
@@ -47,115 +51,86 @@ class Weighting(Enum):
 POWERS = {Weighting.EQUAL: 0, Weighting.LINEAR: 1, Weighting.QUADRATIC: 2, Weighting.CUBIC: 3}
 
 
-@dataclass(frozen=True, slots=True)
-class Stack:
-    """Readings of several stations, one of each, side by side: (n, 2), (n,), (n, 2, 2), (n, 2, 2) and (n, 2, s)."""
-
-    lean: Array
-    down: Array
-    cov: Array
-    information: Array
-    shared: Array
-
-
 def stack_of(readings: Sequence[Direction]) -> Stack:
     """Return readings stacked along a first axis (n,)."""
-    rows = [(one.lean, one.down, one.cov, one.information) for one in readings]
-    lean, down, cov, information = map(np.array, zip(*rows, strict=True))
-    return Stack(lean, down, cov, information, stack_shared_errors(readings, max(one.width for one in readings)))
+    return _stacked([*map(on_sphere, readings)])
 
 
-@dataclass(slots=True)
+def _stacked(found: Sequence[SphereDirection], width: int = 0) -> Stack:
+    """The same, with as many columns as the widest has, or ``width``."""
+    columns = _columns_of(found, max(width, *map(WIDTH, found)) if len(found) > 1 else max(width, found[0].width))
+    tangents, covs, yaw_vars = (np.array([*map(part, found)]) for part in (TANGENT, OWN, YAW_VARS))
+    return Stack(tangents, covs, columns, yaw_vars)
+
+
+def _columns_of(directions: Sequence[SphereDirection], width: int) -> Array:
+    """Columns (n, 3, width) of unit vectors, with zeros for those that one does not know."""
+    columns = np.zeros((len(directions), 3, width))
+    for own, packed in zip(columns, map(PACKED, directions), strict=True):
+        own[:, packed.places] = packed.values
+    return columns
+
+
 class StationFusion:
-    """Running recursive Bayes of one station."""
+    """Recursive Bayes of one station: its readings, and what they come to."""
 
-    count: int = 0
-    _sums: Array = field(default_factory=lambda: np.zeros((5, 2)))  # information, weighted lean, random covariance
-    _shared: Packed = field(default_factory=lambda: Packed(np.zeros((2, 0))))
-    _down: float = 0.0
+    def __init__(self) -> None:
+        self._readings: list[SphereDirection] = []
+
+    @property
+    def count(self) -> int:
+        """Number of readings."""
+        return len(self._readings)
 
     def add_reading(self, reading: Direction) -> None:
         """Add one cluster, weighted by the inverse of its total covariance, shared errors included."""
-        self.add_each([self], stack_of([reading]))
+        self._readings.append(on_sphere(reading))
 
-    def fused(self) -> Direction:
-        """Mean, random covariance (2, 2) and shared columns (2, s)."""
-        return self.fuse_each([self])[0]
-
-    @staticmethod
-    def add_each(fusions: Sequence[StationFusion], readings: Stack) -> None:
-        """Add one reading to each of several stations; equal bit for bit to adding them one by one."""
-        weighed = readings.information @ readings.shared
-        shared = np.zeros((*weighed.shape[:2], max(weighed.shape[2], *(one._shared.width for one in fusions))))
-        for own, one in zip(shared, fusions, strict=True):
-            one._shared.fill(own)
-        shared[:, :, : weighed.shape[2]] += weighed
-        lean = (readings.information @ readings.lean[:, :, None])[:, :, 0]
-        random = readings.information @ readings.cov @ readings.information
-        sums = np.array([one._sums for one in fusions])
-        sums[:, :2] += readings.information
-        sums[:, 2] += lean
-        sums[:, 3:] += random
-        for one, own, packed, down in zip(fusions, sums, packed_each(shared), readings.down.tolist(), strict=True):
-            one._sums, one._shared, one._down = own.copy(), packed, one._down + down
-            one.count += 1
-
-    @staticmethod
-    def fuse_each(fusions: Sequence[StationFusion]) -> list[Direction]:
-        """Return the fused direction of each station."""
-        sums = np.array([one._sums for one in fusions])
-        gains = np.linalg.inv(sums[:, :2])
-        leans = (gains @ sums[:, 2, :, None])[:, :, 0]
-        covs = gains @ sums[:, 3:] @ gains
-        rows = zip(fusions, gains, leans, covs, strict=True)
-        return [
-            Fused(lean.copy(), vertical_part(lean, one._down), cov.copy(), one._shared.under(gain))
-            for one, gain, lean, cov in rows
-        ]
+    def fused(self) -> SphereDirection:
+        """Mean on the sphere, random covariance and shared columns."""
+        return fuse_by_bayes(self._readings)
 
 
 class GrowingBayes:
-    """Recursive Bayes of readings that mostly grow at their end: the sum over the earlier ones is reused."""
+    """Recursive Bayes of readings that mostly grow at their end: what they came to last is kept."""
 
     def __init__(self) -> None:
-        self._fusion = StationFusion()
         self._begin = self._end = 0
-        self._known: Direction | None = None  # what they came to
+        self._known: SphereDirection | None = None
 
-    def of(self, begin: int, end: int, readings: Callable[[int, int], Iterable[Direction]]) -> Direction:
-        """Return ``fuse_by_bayes`` of the readings from ``begin`` to before ``end``, equal bit for bit.
+    def of(self, begin: int, end: int, readings: Callable[[int, int], Iterable[Direction]]) -> SphereDirection:
+        """Return ``fuse_by_bayes`` of the readings from ``begin`` to before ``end``.
 
         ``readings(begin, end)`` gives those of such a range.
         """
-        if begin != self._begin or end < self._end or self._end < begin:
-            self._fusion, self._begin, self._end, self._known = StationFusion(), begin, begin, None
-        if self._known is None or self._end != end:
-            for reading in readings(self._end, end):
-                self._fusion.add_reading(reading)
-            self._known = self._fusion.fused()
-        self._end = end
-        return self._known
+        known = self.known(begin, end)
+        return self._keep(begin, end, fuse_by_bayes([*readings(begin, end)])) if known is None else known
 
-    def known(self, begin: int, end: int) -> Direction | None:
+    def _keep(self, begin: int, end: int, found: SphereDirection) -> SphereDirection:
+        self._begin, self._end, self._known = begin, end, found
+        return found
+
+    def known(self, begin: int, end: int) -> SphereDirection | None:
         """Return the fused direction of a range if it was the last one asked for, else None."""
         return self._known if (begin, end) == (self._begin, self._end) else None
 
     def lacks_one(self, begin: int, end: int) -> bool:
-        """Return whether the sum holds all readings of a range but the last."""
+        """Return whether what is known is that of all readings of a range but the last."""
         return (begin, end) == (self._begin, self._end + 1)
 
     @staticmethod
-    def grow_each(growing: Sequence[GrowingBayes], readings: Stack) -> None:
-        """Add to each of several sums the one reading that it lacks."""
-        fusions = [one._fusion for one in growing]
-        StationFusion.add_each(fusions, readings)
-        for one, known in zip(growing, StationFusion.fuse_each(fusions), strict=True):
-            one._end, one._known = one._end + 1, known
+    def fuse_each(growing: Sequence[GrowingBayes], ranges: Sequence[tuple[int, int]], readings: Stack) -> None:
+        """Fuse the readings of several ranges, which stand one after the other; each as by itself bit for bit."""
+        begin = np.cumsum([0, *(end - first for first, end in ranges)])
+        packed = packed_each(readings.shared)
+        found = fuse_on_sphere(readings.tangents, readings.covs, packed, readings.yaw_vars, begin)
+        for one, (first, end), direction in zip(growing, ranges, found, strict=True):
+            one._keep(first, end, direction)
 
     def forget(self, place: int) -> None:
-        """Drop the sum if it holds the reading at ``place``, which has changed with all behind it."""
+        """Drop what is known if the reading at ``place`` is in it, which has changed with all behind it."""
         if place < self._end:
-            self._fusion, self._end, self._known = StationFusion(), self._begin, None
+            self._begin, self._end, self._known = self._begin, self._begin, None
 
 
 def vertical_part(lean: Array, sense: float) -> float:
@@ -163,12 +138,11 @@ def vertical_part(lean: Array, sense: float) -> float:
     return math.copysign(math.sqrt(1.0 - min(float(lean @ lean), 1.0)), sense)
 
 
-def fuse_by_bayes(readings: Sequence[Direction]) -> Direction:
-    """Recursive Bayes of at least one reading."""
-    fusion = StationFusion()
-    for reading in readings:
-        fusion.add_reading(reading)
-    return fusion.fused()
+def fuse_by_bayes(readings: Sequence[Direction]) -> SphereDirection:
+    """Recursive Bayes of at least one reading, see ``sphere_fusion``."""
+    found = [*map(on_sphere, readings)]
+    tangents, covs, yaw_vars = (np.array([*map(part, found)]) for part in (TANGENT, OWN, YAW_VARS))
+    return fuse_on_sphere(tangents, covs, [*map(PACKED, found)], yaw_vars, np.array([0, len(found)]))[0]
 
 
 def sequence_weights(count: int, power: int) -> Array:
@@ -183,13 +157,14 @@ def fuse_by_scheme(readings: Sequence[Direction], scheme: Weighting) -> Directio
         return fuse_by_bayes(readings)
     if scheme is Weighting.ADAPTIVE:
         scheme = adaptive_weighting(readings)
-    weights = sequence_weights(len(readings), POWERS[scheme])
-    lean = np.sum([w * r.lean for w, r in zip(weights, readings, strict=True)], axis=0)
-    cov = np.sum([w * w * r.cov for w, r in zip(weights, readings, strict=True)], axis=0)
-    shared = np.zeros((2, 0))
-    for w, r in zip(weights, readings, strict=True):
-        shared = add_shared_errors(shared, w * r.shared)
-    return Direction(lean, vertical_part(lean, sum(r.down for r in readings)), cov, shared)
+    weights, found = sequence_weights(len(readings), POWERS[scheme]), [*map(on_sphere, readings)]
+    lean = np.sum([w * one.lean for w, one in zip(weights, found, strict=True)], axis=0)
+    tangent = np.array([*lean, vertical_part(lean, sum(one.down for one in found))])
+    own = np.sum([w * w * one.own for w, one in zip(weights, found, strict=True)], axis=0)
+    columns = _columns_of(found, max(one.width for one in found))
+    shared = np.sum([w * each for w, each in zip(weights, columns, strict=True)], axis=0)
+    yaw_vars = tuple((weights**2 @ np.array([one.yaw_vars for one in found])).tolist())
+    return SphereDirection(tangent, own, Packed(shared), yaw_vars)
 
 
 def adaptive_weighting(readings: Sequence[Direction]) -> Weighting:
@@ -205,7 +180,7 @@ def newest_departure(readings: Sequence[Direction]) -> tuple[Array, float]:
     return departure_from(fuse_by_bayes(readings[:-1]), readings[-1]) if len(readings) > 1 else (np.zeros(2), 0.0)
 
 
-def departure_from(earlier: Direction, newest: Direction) -> tuple[Array, float]:
+def departure_from(earlier: SphereDirection, newest: Direction) -> tuple[Array, float]:
     """Return the departure of a reading from the fused earlier ones: vector (2,) and size in standard deviations.
 
     The covariance of the difference knows what the two have in common: an error of the same mount cancels.
@@ -213,14 +188,16 @@ def departure_from(earlier: Direction, newest: Direction) -> tuple[Array, float]
     return departures_from([earlier], stack_of([newest]))[0]
 
 
-def departures_from(earlier: Sequence[Direction], newest: Stack) -> list[Departure]:
-    """Return ``departure_from`` of several stations."""
-    differences = newest.lean - np.array([one.lean for one in earlier])
-    apart = -stack_shared_errors(earlier, max(newest.shared.shape[2], *(one.width for one in earlier)))
-    apart[:, :, : newest.shared.shape[2]] += newest.shared
-    covs = newest.cov + np.array([one.cov for one in earlier]) + apart @ apart.transpose(0, 2, 1)
-    squares = differences[:, None] @ np.linalg.solve(covs, differences[:, :, None])
-    return [(one, math.sqrt(square)) for one, square in zip(differences, squares[:, 0, 0].tolist(), strict=True)]
+def departures_from(earlier: Sequence[SphereDirection], newest: Stack) -> list[Departure]:
+    """Return ``departure_from`` of several stations, each across its earlier direction: to north and east, tilted."""
+    before, after = _stacked(earlier, newest.shared.shape[2]), newest
+    if before.shared.shape[2] > newest.shared.shape[2]:
+        shared = np.zeros_like(before.shared)
+        shared[:, :, : newest.shared.shape[2]] = newest.shared
+        after = replace(newest, shared=shared)
+    apart, covs = off_direction(before, after)
+    squares = apart[:, None] @ np.linalg.solve(covs, apart[:, :, None])
+    return [(one, math.sqrt(square)) for one, square in zip(apart, squares[:, 0, 0].tolist(), strict=True)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,8 @@
 """From the specific force of a stop and the tracked yaw to the direction of the tube.
 
-The result is the lean vector l = (sin I cos A, sin I sin A), the horizontal part of the tube's downhole direction. It
-stays regular where the azimuth does not (I -> 0), so covariances are carried in it and converted at the end.
+The result is the tube's downhole unit vector with the covariance of its three parts, which is regular at every
+inclination: its horizontal part, the lean l = (sin I cos A, sin I sin A), where the azimuth is not (I -> 0), and its
+vertical part where a lean does not change with the inclination (I = 90 deg).
 Source: thesis eqs. 1.1-1.3, with the sign of the specific force of a body at rest (up).
 """
 
@@ -16,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
+from groundstation.survey.bearings import planes_across
 
 Array = npt.NDArray[np.float64]
 GRAVITY_TOLERANCE = 0.005  # of g, largest ||f| - g| of a stop at rest
@@ -88,16 +90,23 @@ def known_direction(inclination: float, azimuth: float) -> Direction:
 class Resolved:
     """Resolved stops side by side, or one: directions without shared errors, and how those would act on them."""
 
-    lean: Array  # (n, 2), or (2,) of one
-    down: Array  # (n,), of one a number
-    cov: Array  # (n, 2, 2)
-    by_force: Array  # (n, 2, 3) change of the lean for one m/s^2 on each body axis
-    by_yaw: Array  # (n, 2) change of the lean for one rad of yaw
+    tangent: Array  # (n, 3), or (3,) of one: downhole unit vector
+    cov: Array  # (n, 3, 3) of it
+    by_force: Array  # (n, 3, 3) its change for one m/s^2 on each body axis
+    by_yaw: Array  # (n, 3) its change for one rad of yaw
+    yaw_var: Array  # (n,) rad^2, of what is random in the yaw; it is in the covariance
+
+    @property
+    def lean(self) -> Array:
+        """Horizontal parts (n, 2)."""
+        return self.tangent[..., :2]
 
     @property
     def direction(self) -> Direction:
         """Direction of one stop."""
-        return Direction(self.lean, float(self.down), self.cov, np.zeros((2, 0)))
+        from groundstation.survey.fusion.sphere_direction import bare_direction  # which is a direction as defined here
+
+        return bare_direction(self.tangent, self.cov, float(self.yaw_var))
 
 
 def resolve_direction(force: Array, force_cov: Array, yaw: float, yaw_var: float) -> Resolved:
@@ -111,16 +120,19 @@ def resolve_direction(force: Array, force_cov: Array, yaw: float, yaw_var: float
     Raises
     ------
     SurveyError
-        When the force vanishes or is not finite, or nothing is uncertain in some direction of the lean.
+        When the force vanishes or is not finite, or nothing is uncertain in some direction across the tube.
     """
     found = resolve_all(force[None], force_cov[None], [yaw], [yaw_var])
-    return Resolved(found.lean[0], found.down[0], found.cov[0], found.by_force[0], found.by_yaw[0])
+    return Resolved(found.tangent[0], found.cov[0], found.by_force[0], found.by_yaw[0], found.yaw_var[0])
 
 
 def resolve_all(forces: Array, covs: Array, yaws: Sequence[float], yaw_vars: Sequence[float] | Array) -> Resolved:
     """The same of many stops, (n, 3) and (n, 3, 3), bit for bit; raises where one of them cannot be resolved."""
     sizes = np.sqrt((forces[:, None] @ forces[:, :, None])[:, 0, 0])
-    turns = np.zeros((len(forces), 2, 3))  # from the body to north and east
+    turns = np.zeros(
+        (len(forces), 3, 3)
+    )  # from the force in the body, which is up, to north, east and down of the tube
+    turns[:, 2, 2] = -1.0
     for turn, size, yaw in zip(turns, sizes.tolist(), yaws, strict=True):
         if not math.isfinite(size) or size < 1e-3 or not math.isfinite(yaw):
             raise SurveyError(
@@ -130,14 +142,17 @@ def resolve_all(forces: Array, covs: Array, yaws: Sequence[float], yaw_vars: Seq
         turn[1, 0] = math.sin(yaw)
         turn[0, 1] = -turn[1, 0]
     units = forces / sizes[:, None]
-    leans = (turns @ units[:, :, None])[:, :, 0]
-    by_force = (turns - leans[:, :, None] * units[:, None]) / sizes[:, None, None]
-    by_yaw = np.stack([-leans[:, 1], leans[:, 0]], axis=1)
-    turned = np.array(yaw_vars)[:, None, None] * (by_yaw[:, :, None] * by_yaw[:, None])
+    tangents = (turns @ units[:, :, None])[:, :, 0]
+    by_force = (turns - tangents[:, :, None] * units[:, None]) / sizes[:, None, None]
+    by_yaw = np.stack([-tangents[:, 1], tangents[:, 0], np.zeros(len(tangents))], axis=1)
+    known = np.array(yaw_vars, float)
+    turned = known[:, None, None] * (by_yaw[:, :, None] * by_yaw[:, None])
     found = by_force @ covs @ by_force.transpose(0, 2, 1) + turned
-    if not is_covariance(found):
-        raise SurveyError(f"resolve: expected a positive definite covariance of the lean, got {found.tolist()}")
-    return Resolved(leans, -units[:, 2], found, by_force, by_yaw)
+    axes = planes_across(tangents)
+    across = axes @ found @ axes.transpose(0, 2, 1)
+    if not is_covariance(across):
+        raise SurveyError(f"resolve: expected a positive definite covariance across the tube, got {across.tolist()}")
+    return Resolved(tangents, found, by_force, by_yaw, known)
 
 
 def is_covariance(covs: Array) -> bool:
@@ -186,25 +201,17 @@ def direction_angles(lean: Array, down: float) -> tuple[float, float]:
 
 
 def angle_stds(lean: Array, down: float, cov: Array) -> tuple[float, float]:
-    """Standard deviations (rad) of inclination and azimuth; the azimuth's is at most pi, where nothing is known."""
-    return angle_stds_of_all(lean[None], [down], cov[None])[0]
+    """Standard deviations (rad) of inclination and azimuth by the covariance (2, 2) of the lean.
 
-
-def angle_stds_of_all(leans: Array, downs: Sequence[float], covs: Array) -> list[tuple[float, float]]:
-    """Return ``angle_stds`` of many directions: leans (n, 2), covariances (n, 2, 2)."""
-    sizes = [math.hypot(x, y) for x, y in leans.tolist()]
-    along = leans / np.array([size if size >= UPRIGHT else 1.0 for size in sizes])[:, None]
-    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    variances = ((unit[:, None] @ covs @ unit[:, :, None])[:, 0, 0].tolist() for unit in (along, across))
-    traces = np.trace(covs, axis1=1, axis2=2).tolist()
-    return [_stds(*row) for row in zip(sizes, downs, *variances, traces, strict=True)]
-
-
-def _stds(size: float, down: float, along_var: float, across_var: float, trace: float) -> tuple[float, float]:
+    The azimuth's is at most pi, where nothing is known. A lean does not say how well the inclination of a level hole is
+    known: ``sphere_direction.stds_of_directions`` does.
+    """
+    size = math.hypot(lean[0], lean[1])
     if size < UPRIGHT:
-        return math.sqrt(trace / 2.0), math.pi
-    inclination = math.sqrt(max(along_var, 0.0)) / max(abs(down), 1e-6)
-    return inclination, min(math.sqrt(max(across_var, 0.0)) / size, math.pi)
+        return math.sqrt(float(np.trace(cov)) / 2.0), math.pi
+    along, across = lean / size, np.array([-lean[1], lean[0]]) / size
+    inclination = math.sqrt(max(float(along @ cov @ along), 0.0)) / max(abs(down), 1e-6)
+    return inclination, min(math.sqrt(max(float(across @ cov @ across), 0.0)) / size, math.pi)
 
 
 def combine_imus(forces: Array, covs: Array) -> tuple[Array, Array]:

@@ -1,28 +1,28 @@
 """Errors that readings share: the accelerometer biases and the mount of a tube, the marks of a joint.
 
 A tube keeps its IMU and a closed joint its reading, so two readings err alike as far as they have these in common.
-Each such error is one column; a reading's column is the change of its lean for one standard deviation. Whatever is
-linear in the readings (a fused station, a position) carries the same columns, and its covariance is their product with
-themselves.
+Each such error is one column; a reading's column is the change of its unit vector for one standard deviation. Whatever
+is linear in the readings (a fused station, a position) carries the same columns, and its covariance is their product
+with themselves.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Direction, Resolved
+from groundstation.survey.fusion.sphere_direction import SphereDirection
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
 Name = tuple[str | int, ...]
 AXES = 3  # of an accelerometer
 CAUSES = 2 + AXES  # of the columns of a reading: mount, joint, and each axis
-MOST_OF_16_BITS = 1 << 16
 KINDS = {
     "mount": "mounts", "joint": "joints", "drive": "joints", "string": "joints", "bias": "accelerometer_bias",
     "scale": "depth", "offset": "depth", "length": "depth",
@@ -32,15 +32,15 @@ TRANSPORT, ADJUSTED = "transport", "adjusted"  # of columns that random errors s
 
 
 def put_columns(columns: Array, causes: Array, places: Places) -> None:
-    """Write the columns of a reading into zeros (2, s): mount, every joint alike, and axes, from ``causes`` (2, 5)."""
+    """Write the columns of a reading into zeros (3, s): mount, every joint alike, and axes, from ``causes`` (3, 5)."""
     columns[:, places[0]] = causes[:, 0]
     columns[:, places[1:-AXES]] = causes[:, 1:2]
     columns[:, places[-AXES:]] = causes[:, -AXES:]
 
 
 def columns_of(causes: Array, places: Sequence[Places], width: int) -> Array:
-    """Columns (n, 2, width) of several readings, from (n, 2, 5) and the places of each."""
-    columns = np.zeros((len(causes), 2, width))
+    """Columns (n, k, width) of several readings, from (n, k, 5) and the places of each."""
+    columns = np.zeros((len(causes), causes.shape[1], width))
     counts = np.array([*map(len, places)])
     ends = counts.cumsum()
     cause = np.ones(ends[-1], np.intp)  # of a place: every joint alike
@@ -50,89 +50,6 @@ def columns_of(causes: Array, places: Sequence[Places], width: int) -> Array:
     reading = np.repeat(np.arange(len(causes)), counts)
     columns[reading, :, np.concatenate(places)] = causes[reading, :, cause]
     return columns
-
-
-class Packed:
-    """Columns (k, s) of which most are zero: a station knows those of the tubes that passed it, of a hundred tubes.
-
-    Attributes
-    ----------
-    width : how many there are
-    places : (c,) of those that may not be zero
-    values : (k, c) what stands there
-    """
-
-    __slots__ = ("places", "values", "width")
-
-    def __init__(self, columns: Array, places: Places | None = None) -> None:
-        """``places`` of those that are not zero, where they are known."""
-        at = np.flatnonzero(columns.any(axis=0)) if places is None else places
-        self.places: npt.NDArray[Any] = at.astype(np.uint16 if columns.shape[1] <= MOST_OF_16_BITS else np.intp)
-        self.values: Array = columns.take(at, axis=1)
-        self.width = int(columns.shape[1])
-
-    @classmethod
-    def of_values(cls, values: Array, places: Places, width: int) -> Packed:
-        """Columns of which ``values`` (k, c) stand at ``places`` (c,), of ``width``."""
-        made = cls.__new__(cls)
-        made.places = places.astype(np.uint16 if width <= MOST_OF_16_BITS else np.intp)
-        made.values, made.width = values, width
-        return made
-
-    def under(self, matrix: Array) -> Packed:
-        """Return the columns ``matrix`` (j, k) @ columns (k, s), of shape (j, s)."""
-        return Packed.of_values(matrix @ self.values, self.places, self.width)
-
-    def columns(self) -> Array:
-        """All of them (k, s), made anew."""
-        columns = np.zeros((len(self.values), self.width))
-        self.fill(columns)
-        return columns
-
-    def fill(self, columns: Array) -> None:
-        """Put them into zeros (k, s or more)."""
-        columns[:, self.places] = self.values
-
-
-def packed_each(columns: Array) -> list[Packed]:
-    """Columns (n, k, s) of several, each packed by itself."""
-    are_some = np.asarray(columns.any(axis=1))
-    return [Packed(own, some.nonzero()[0]) for own, some in zip(columns, are_some, strict=True)]
-
-
-class Fused(Direction):
-    """Direction from several readings; its columns are kept packed."""
-
-    __slots__ = ("_packed",)
-    _packed: Packed
-
-    def __init__(self, lean: Array, down: float, cov: Array, packed: Packed) -> None:
-        for name, value in (("lean", lean), ("down", down), ("cov", cov), ("_packed", packed)):
-            object.__setattr__(self, name, value)
-
-    @property
-    def shared(self) -> Array:
-        """Columns (2, s), made anew."""
-        return self._packed.columns()
-
-    @property
-    def packed(self) -> Packed:
-        """Shared columns as they are stored."""
-        return self._packed
-
-    @property
-    def width(self) -> int:
-        """Number s of shared columns."""
-        return self._packed.width
-
-    def fill(self, columns: Array) -> None:
-        """Write the shared columns into ``columns``, zeros (2, >= s)."""
-        self._packed.fill(columns)
-
-
-def packed_of(direction: Direction) -> Packed:
-    """Columns of any direction, packed."""
-    return direction.packed if isinstance(direction, Fused) else Packed(direction.shared)
 
 
 class SharedErrors:
@@ -159,12 +76,13 @@ class SharedErrors:
         systematic_var: float,
         mount_var: float,
         force_bias_std: float,
-    ) -> Direction:
+    ) -> SphereDirection:
         """Direction of one stop with its columns, parameters as ``causes_of``."""
         causes, places = self.causes_of(resolved, tube, above, systematic_var, mount_var, force_bias_std)
-        columns = np.zeros((2, len(self._columns)))
+        columns = np.zeros((3, len(self._columns)))
         put_columns(columns, causes, places)
-        return Direction(resolved.lean, float(resolved.down), resolved.cov, columns)
+        yaw_vars = float(resolved.yaw_var), float(systematic_var)
+        return SphereDirection(resolved.tangent, resolved.cov, Packed(columns), yaw_vars)
 
     def causes_of(
         self,
@@ -175,7 +93,7 @@ class SharedErrors:
         mount_var: float,
         force_bias_std: float,
     ) -> tuple[Array, Places]:
-        """What one stop shares (2, 5), and at which places its columns stand.
+        """What one stop shares (3, 5), and at which places its columns stand.
 
         Parameters
         ----------
@@ -274,34 +192,22 @@ def stack_shared_errors(directions: Sequence[Direction], width: int) -> Array:
 def causes_of_all(
     by_yaw: Array, by_force: Array, places: Sequence[Places], systematic_var: Array, mount_var: float, bias_std: float
 ) -> Array:
-    """What stops share (n, 2, 5): mount, joints and the three axes, each as it acts on the lean.
+    """What stops share (n, 3, 5): mount, joints and the three axes, each as it acts on the unit vector.
 
     Parameters
     ----------
-    by_yaw, by_force : (n, 2) and (n, 2, 3) change of the lean for one rad, and one m/s^2
+    by_yaw, by_force : (n, 3) and (n, 3, 3) change of the unit vector for one rad, and one m/s^2
     places : of the columns of each stop
     systematic_var, mount_var : (n,) and one, rad^2, see ``SharedErrors.causes_of``
     bias_std : m/s^2, of each axis of an accelerometer
     """
     mount = np.minimum(mount_var, systematic_var)
     joints = np.array([*map(len, places)]) - 1 - AXES
-    causes = np.empty((len(places), 2, CAUSES))
+    causes = np.empty((len(places), 3, CAUSES))
     causes[:, :, 0] = np.sqrt(mount)[:, None] * by_yaw
     causes[:, :, 1] = np.sqrt((systematic_var - mount) / joints)[:, None] * by_yaw
     causes[:, :, 2:] = bias_std * by_force
     return causes
-
-
-def weights_of(covs: Array, causes: Array, places: Sequence[Places], width: int) -> Array:
-    """Information (n, 2, 2) of stops: the inverse of all they do not know, of ``width`` shared errors at most.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        When one of them has none.
-    """
-    shared = columns_of(causes, places, width)
-    return np.asarray(np.linalg.inv(covs + shared @ shared.transpose(0, 2, 1)))
 
 
 def widen_shared_errors(shared: Array, columns: int) -> Array:

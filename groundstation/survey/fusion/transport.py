@@ -25,7 +25,7 @@ import numpy.typing as npt
 
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import stack_shared_errors
-from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
+from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

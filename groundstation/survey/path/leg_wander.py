@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -64,6 +64,9 @@ class LegWander:
         Where the leg undoes more than it adds nothing is taken off: the planes of two legs are not quite the same.
         """
         return self.std**2 * max(moment.variance + 2.0 * moment.with_start * memory, 0.0)
+
+
+STEADY: Final = LegWander(0.0, 1.0)  # a path that does what its arcs do
 
 
 @lru_cache(maxsize=4096)

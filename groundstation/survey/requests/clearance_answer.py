@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.files.field_files import read_any
+from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.requests.clearance_request import ClearanceRequest
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.well.analysis import record_variables
@@ -20,6 +22,7 @@ from groundstation.survey.well.reference_frames import SAME_DEPTH
 from groundstation.survey.well.well_record import SurveyRecord
 
 Array = npt.NDArray[np.float64]
+RELAY_CURVATURE_DEG = 0.3  # deg/m, as a ground station has it while it drills
 SAME_PLACE = 0.1  # m, of two records of one hole
 
 
@@ -36,6 +39,9 @@ class _Described:
 
 def answer_clearance(request: ClearanceRequest) -> dict[str, Any]:
     """The object that ``borechain clearance --json`` prints; ``clear`` says whether every factor is above 1.
+
+    How a path may leave its arcs is in the models of the industry or not meant to be; of ``relay`` it is counted as the
+    ground station does while it drills, unless the request says otherwise.
 
     Raises
     ------
@@ -55,7 +61,19 @@ def answer_clearance(request: ClearanceRequest) -> dict[str, Any]:
         holes = [_hole(hole, serial) for hole in (mine, theirs)]
     else:
         holes = _sidetrack(mine, theirs, request.from_m, serial)
+    holes = [
+        replace(hole, wander=_wander(request, described.instrument))
+        for hole, described in zip(holes, (mine, theirs), strict=True)
+    ]
     return clearance_result(clearance_between(holes[0], holes[1], request.site.to_site(), rule), request.from_m)
+
+
+def _wander(request: ClearanceRequest, instrument: str) -> LegWander:
+    """Curvature of a path that an instrument surveyed."""
+    std = request.curvature_sigma_deg_per_m
+    if std is None:
+        std = RELAY_CURVATURE_DEG if instrument == "relay" else 0.0
+    return LegWander(math.radians(std), request.curvature_length_m)
 
 
 def _hole(described: _Described, serial: str, first: int = 0) -> ClearanceHole:

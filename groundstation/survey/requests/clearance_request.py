@@ -24,4 +24,6 @@ class ClearanceRequest:
     k: float = 3.5  # of the rule
     sigma_ahead_m: float = 0.5
     margin_m: float = 0.3
+    curvature_sigma_deg_per_m: float | None = None  # of the paths between stations; see ``answer_clearance``
+    curvature_length_m: float = 20.0  # over which it is forgotten
     site: SiteFigures = field(default_factory=SiteFigures)

@@ -201,7 +201,7 @@ def column_row(found: Wall, k: int) -> dict[str, Any]:
     cov = built.toe_covs[k] + plan.head_std**2 * np.diag([1.0, 1.0, 0.0])
     point = TrajectoryPoint(float(built.surveyed[k]), plan.design.axis, head + built.toes[k], cov, np.zeros((3, 0)))
     found_ = point_deviation(point, plan.design)
-    north, east, _ = (found_.offset @ plan.design.across).tolist()
+    north, east, _ = (found_.offset @ plan.design.across_at(np.array([found_.along]))[0]).tolist()
     return row | {
         "deviation_cm": 100.0 * found_.size,
         "deviation_percent": 100.0 * found_.size / max(found_.along, 1e-9),

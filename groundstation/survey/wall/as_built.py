@@ -85,8 +85,8 @@ def covariance_roots(cov: Array) -> Array:
 
 
 def plane_frame(designs: list[ColumnDesign]) -> Array:
-    """Rows (3, 3): two axes across the mean of the design axes, and that mean: north, east, down of vertical ones."""
-    mean = np.mean([design.axis for design in designs], axis=0)
+    """Rows (3, 3): two axes across the mean way from head to toe, and that mean: north, east, down of vertical ones."""
+    mean = np.mean([design.chord for design in designs], axis=0)
     mean /= np.linalg.norm(mean)
     if abs(mean[2]) > 1.0 - 1e-12:
         return np.eye(3)

@@ -20,7 +20,9 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.fusion.resolve import Direction, angle_stds, direction_angles
+from groundstation.survey.bearings import planes_across
+from groundstation.survey.fusion.resolve import Direction, direction_angles
+from groundstation.survey.fusion.sphere_direction import stds_of_directions
 from groundstation.survey.well.trajectory import TrajectoryPoint
 from groundstation.survey.well.well_plan import WellPlan
 
@@ -141,6 +143,20 @@ class ColumnDesign:
         head = np.array(self.head)
         return head + (along[:, None] * self.axis if self.plan is None else self.plan.points_at(along).points)
 
+    def across_at(self, along: Array) -> Array:
+        """Two unit vectors (n, 2, 3) across the axis at lengths (n,) along it, m: as in ``Deviations.offset``."""
+        if self.plan is None:
+            return np.broadcast_to(self.across, (len(along), 2, 3))
+        return planes_across(self.plan.points_at(along).tangents)
+
+    @cached_property
+    def chord(self) -> Array:
+        """Unit vector (3,) from head to toe."""
+        if self.plan is None:
+            return self.axis
+        way = self.plan.positions[-1]
+        return np.asarray(way / np.linalg.norm(way))
+
     @cached_property
     def end(self) -> DesignEnd:
         """Target of the column."""
@@ -254,18 +270,6 @@ def _plan_deviations(md: Array, offsets: Array, covs: Array, plan: WellPlan, tol
     return Deviations(md.copy(), nearest.along, apart, turned, limit)
 
 
-def planes_across(tangents: Array) -> Array:
-    """Two unit vectors (..., 2, 3) across directions (..., 3): north and east, tilted with the direction.
-
-    They are high side and right turned back by the azimuth, so that they stay as they are where a plan passes the
-    vertical; they have no value straight up.
-    """
-    x, y, z = np.moveaxis(tangents, -1, 0)
-    apart = 1.0 + z
-    first = np.stack([1.0 - x * x / apart, -x * y / apart, -x], axis=-1)
-    return np.stack([first, np.stack([-x * y / apart, 1.0 - y * y / apart, -y], axis=-1)], axis=-2)
-
-
 def point_deviation(point: TrajectoryPoint, design: ColumnDesign) -> Deviation:
     """Deviation of one point."""
     return axis_deviations(np.array([point.md]), point.position[None], point.cov[None], design)[0]
@@ -291,5 +295,5 @@ class Dominant:
 def lateral_errors(direction: Direction, length: float) -> Dominant:
     """Lateral errors L cos I sigma_I and L sin I sigma_A of a hole that leans all along like ``direction``."""
     inclination, _ = direction_angles(direction.lean, direction.down)
-    std_i, std_a = angle_stds(direction.lean, direction.down, direction.total_cov)
+    ((std_i, std_a),) = stds_of_directions([direction])
     return Dominant(length * abs(math.cos(inclination)) * std_i, length * math.sin(inclination) * std_a)

@@ -62,7 +62,7 @@ def tight_depths(designs: Sequence[ColumnDesign], frame: Array, pairs: Pairs, st
 def _ends(designs: Sequence[ColumnDesign], frame: Array) -> Array:
     """Heads and toes (columns, 2, 2) as their depth below the site's zero and along the planes' normal."""
     heads = np.array([design.head for design in designs])
-    toes = heads + np.array([design.length * design.axis for design in designs])
+    toes = np.array([design.end.point for design in designs])
     both = np.stack([heads, toes], axis=1)
     return np.stack([both[..., 2], both @ frame[2]], axis=-1)
 

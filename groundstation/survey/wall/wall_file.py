@@ -8,10 +8,10 @@ from __future__ import annotations
 import hashlib
 import math
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,22 +22,28 @@ from groundstation.survey.wall.as_built import Columns
 from groundstation.survey.wall.closing import ClosingDay, closing_by_day
 from groundstation.survey.wall.column_deviation import Tolerance, parse_tolerance
 from groundstation.survey.wall.column_joint import largest_distance
+from groundstation.survey.wall.column_plans import Assumptions, ColumnPlan, ColumnSurvey
 from groundstation.survey.wall.tight_depths import TightRange, asked_depths, check_reach, tight_depths
-from groundstation.survey.wall.wall_columns import Assumptions, BuiltWall, ColumnPlan, ColumnSurvey, Layer, build_wall
+from groundstation.survey.wall.wall_columns import BuiltWall, build_wall
 from groundstation.survey.wall.wall_frames import FRAMES, NORTH_ANGLES, ORIGIN, PLACE, grid_of, norths_of, place_of
 from groundstation.survey.wall.wall_joints import Detour, neighbours_in_grid, neighbours_in_line
+from groundstation.survey.wall.wall_layers import MOST_RADIUS_CV, layers_of
 from groundstation.survey.wall.wall_stations import read_holes
-from groundstation.survey.wall.wall_tables import Defaults, Remedy, read_heads
+from groundstation.survey.wall.wall_tables import STRAIGHT, Defaults, Remedy, read_course, read_heads
 from groundstation.survey.well.depth_reference import DEPTHS_FROM
 from groundstation.survey.well.methods import Method
 from groundstation.survey.well.reference_frames import SiteGrid
+
+if TYPE_CHECKING:
+    from groundstation.plan_settings import PlanSettings
 
 Array = npt.NDArray[np.float64]
 LAYOUTS = ("line", "shaft", "grid")
 NEEDED = ("radius_m", "thickness_m", "heads", "stations")
 NAMED = ("project", "client", "calibration", "height_datum")  # of the report alone
 DEPTHS = ("depth_reference", "answer_depth_reference")
-TEXTS = ("name", "heads", "stations", "layout", "tolerance", "instrument", "serial", "method", *NAMED, *FRAMES, *DEPTHS)
+OWN = ("name", "heads", "stations", "layout", "tolerance", "instrument", "serial", "method", "plan")
+TEXTS = (*OWN, *NAMED, *FRAMES, *DEPTHS)
 REFERENCE_HEIGHT = "depth_reference_height_m"
 TIGHT = ("tight_from_m", "tight_to_m")
 SIGNED = (*ORIGIN, *NORTH_ANGLES.values(), *TIGHT, REFERENCE_HEIGHT, *PLACE)  # may be negative
@@ -56,11 +62,10 @@ NOT_NEGATIVE = (
     "radius_cv", "radius_correlation", "head_sigma_m", "unsurveyed_percent", "inclination_deg", "azimuth_deg",
 )  # fmt: skip
 MOST = {
-    "allowed_probability": 0.5, "radius_cv": 0.5, "radius_correlation": 1.0, "unsurveyed_percent": 100.0,
+    "allowed_probability": 0.5, "radius_cv": MOST_RADIUS_CV, "radius_correlation": 1.0, "unsurveyed_percent": 100.0,
     "inclination_deg": 180.0, "azimuth_deg": 360.0, "dip_deg": 90.0, "latitude_deg": 90.0, "declination_deg": 180.0,
     "convergence_deg": 180.0, "north_of_site_deg": 360.0,
 }  # fmt: skip
-LAYER_KEYS = ("from_m", "radius_m", "radius_cv")
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,10 +100,12 @@ class WallFile:
     reference_height: float | None = None  # m, of the former above the latter
     height_datum: str = ""
     grid: SiteGrid | None = None  # site coordinates of positions from the wall's zero
+    course: PlanSettings | None = None  # of columns that state no axis of their own
+    courses: tuple[Path, ...] = ()  # files of plans
 
     def digests(self) -> list[tuple[str, str]]:
         """Name and SHA-256 of each file as it is now."""
-        inputs = (self.path, self.heads, self.stations)
+        inputs = (self.path, self.heads, self.stations, *self.courses)
         return [(path.name, hashlib.sha256(path.read_bytes()).hexdigest()) for path in inputs]
 
     @property
@@ -107,7 +114,7 @@ class WallFile:
         return Defaults(
             self.radius, self.length, self.inclination, self.azimuth, self.tolerance, self.tool, self.serial,
             self.head_std, self.path.parent, self.calibration,
-            (self.depths_read_from, self.depth_reference, self.reference_height),
+            (self.depths_read_from, self.depth_reference, self.reference_height), self.course,
         )  # fmt: skip
 
 
@@ -190,7 +197,7 @@ def read_wall_file(path: Path) -> WallFile:
         north,
         values.get("unsurveyed_percent", 1.0) / 100.0,
         values.get("depth_step_m", 0.5),
-        _layers(path, layers, values.get("radius_cv", 0.0)),
+        layers_of(path, layers, values.get("radius_cv", 0.0)),
         values.get("radius_correlation", 1.0),
         tight,
     )
@@ -224,7 +231,21 @@ def read_wall_file(path: Path) -> WallFile:
         values.get(REFERENCE_HEIGHT),
         values.get("height_datum", ""),
         grid_of(path, values, north),
+        _course(path, values),
+        (path.parent / values["plan"],) if "plan" in values else (),
     )
+
+
+def _course(path: Path, values: dict[str, Any]) -> PlanSettings | None:
+    """Plan of the columns, beside which nothing else says where their axes lead."""
+    if "plan" not in values:
+        return None
+    straight = [key for key in STRAIGHT if key in values]
+    if straight:
+        raise SurveyError(
+            f"{path}: {straight[0]}: expected none beside a plan, which says it, got {values[straight[0]]:g}"
+        )
+    return read_course(path.parent / values["plan"])
 
 
 def instrument_path(path: Path, instrument: str) -> str:
@@ -254,44 +275,17 @@ def _value(path: Path, key: str, value: Any) -> Any:
     return float(value)
 
 
-def _layers(path: Path, tables: Any, radius_cv: float) -> tuple[Layer, ...]:
-    """Radii by depth; above the first layer the radius is that of the wall."""
-    layers = [Layer(-math.inf, None, radius_cv)]
-    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        raise SurveyError(f"{path}: layer: expected tables [[layer]] with {', '.join(LAYER_KEYS)}")
-    for k, table in enumerate(tables, 1):
-        for key in table:
-            if key not in LAYER_KEYS:
-                raise SurveyError(f"{path}: layer {k}: {key}: unknown key; expected one of {', '.join(LAYER_KEYS)}")
-        if "from_m" not in table:
-            raise SurveyError(f"{path}: layer {k}: from_m is missing")
-        given = {key: _layer_value(path, k, key, value) for key, value in table.items()}
-        if given["from_m"] <= layers[-1].top:
-            raise SurveyError(
-                f"{path}: layer {k}: expected from_m beyond {layers[-1].top:g} m, got {given['from_m']:g} m"
-            )
-        layers.append(Layer(given["from_m"], given.get("radius_m"), given.get("radius_cv", radius_cv)))
-    return tuple(layers)
-
-
-def _layer_value(path: Path, k: int, key: str, value: Any) -> float:
-    usable = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
-    if not usable or (key != "from_m" and value < 0.0) or (key == "radius_m" and value == 0.0):
-        raise SurveyError(f"{path}: layer {k}: {key}: expected a positive number, got {value!r:.60}")
-    if key == "radius_cv" and value > MOST["radius_cv"]:
-        raise SurveyError(f"{path}: layer {k}: radius_cv: expected at most {MOST['radius_cv']:g}, got {value!r:.60}")
-    return float(value)
-
-
 def read_wall(path: Path) -> Wall:
     """The whole wall; errors as ``read_wall_file``, of its CSV files with their line."""
     file = read_wall_file(path)
     rows = read_heads(file.heads, file.defaults)
+    courses = dict.fromkeys([*file.courses, *(row.course for row in rows if row.course is not None)])
+    file = replace(file, courses=tuple(courses))
     names = [row.name for row in rows]
     surveys = read_holes(file.stations, [row.plan_without_length for row in rows], [row.depths.height for row in rows])
     holes = [hole.turned(file.stations_turn) for hole in surveys]
     length = file.length or max((float(hole.md[-1]) for hole in holes if len(hole.md)), default=0.0)
-    if not length and any(row.length is None for row in rows):
+    if not length and any(row.length is None for row in rows):  # of a plan it is known
         raise SurveyError(
             f"{path}: length_m is missing; no column was surveyed, so nothing says how deep they are to go"
         )

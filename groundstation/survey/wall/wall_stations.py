@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.files.survey_records import read_columns
-from groundstation.survey.wall.wall_columns import ColumnPlan, ColumnSurvey
+from groundstation.survey.wall.column_plans import ColumnPlan, ColumnSurvey
 from groundstation.survey.well.analysis import RECORD_COLUMNS
 from groundstation.survey.well.reference_frames import SAME_DEPTH
 

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +18,11 @@ from groundstation.errors import SurveyError
 from groundstation.survey.files.survey_records import read_columns
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
 from groundstation.survey.wall.column_deviation import ColumnDesign, Tolerance, parse_tolerance
-from groundstation.survey.wall.wall_columns import ColumnPlan, ColumnStatus
+from groundstation.survey.wall.column_plans import ColumnPlan, ColumnStatus
 from groundstation.survey.well.depth_reference import DEPTHS_FROM, DepthReference, depth_reference
+
+if TYPE_CHECKING:
+    from groundstation.plan_settings import PlanSettings
 
 Array = npt.NDArray[np.float64]
 NUMBERS = (
@@ -26,7 +30,8 @@ NUMBERS = (
     "depth_reference_height_m",
 )  # fmt: skip
 SIGNED = ("down_m", "azimuth_deg", "depth_reference_height_m")  # may be negative
-WORDS = ("state", "instrument", "serial", "calibration", "tolerance", "between", "replaces", "drilled_on")
+WORDS = ("state", "instrument", "serial", "calibration", "tolerance", "between", "replaces", "drilled_on", "plan")
+STRAIGHT = ("inclination_deg", "azimuth_deg", "length_m")  # of an axis without a plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +50,7 @@ class Defaults:
     calibration: str = ""
     # what stations and drilled depths count from, what the heads do, and the height of the one above the other, if any
     depths: tuple[str, str, float | None] = (DEPTHS_FROM[0], DEPTHS_FROM[0], None)
+    course: PlanSettings | None = None  # of the axes
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,11 +81,14 @@ class HeadRow:
     remedy: Remedy
     drilled_on: date | None = None
     depths: DepthReference = field(default_factory=DepthReference)
+    course: Path | None = None  # file of its own plan
 
     def plan(self, length: float) -> ColumnPlan:
         """The plan, ``length`` (m) where the row has none."""
-        design = replace(self.plan_without_length.design, length=self.length or length)
-        return replace(self.plan_without_length, design=design)
+        known = self.plan_without_length
+        if known.design.plan is not None:
+            return known
+        return replace(known, design=replace(known.design, length=self.length or length))
 
 
 def read_heads(path: Path, defaults: Defaults) -> list[HeadRow]:
@@ -106,15 +115,22 @@ def read_heads(path: Path, defaults: Defaults) -> list[HeadRow]:
     if len(wrong):
         raise SurveyError(f"{path}: line {lines[wrong[0]]}: expected finite north_m and east_m")
     tools: dict[str, SurveyTool] = {}
+    courses: dict[str, PlanSettings] = {}
     rows = []
     for k, (line, name) in enumerate(zip(lines, names, strict=True)):
         cells = {key: str(table[key][k]) for key in (*NUMBERS, *WORDS) if key in table}
-        rows.append(_head(f"{path}: line {line}: column {name}", name, heads[k], cells, defaults, tools))
+        rows.append(_head(f"{path}: line {line}: column {name}", name, heads[k], cells, defaults, tools, courses))
     return rows
 
 
 def _head(
-    where: str, name: str, head: Array, cells: dict[str, str], defaults: Defaults, tools: dict[str, SurveyTool]
+    where: str,
+    name: str,
+    head: Array,
+    cells: dict[str, str],
+    defaults: Defaults,
+    tools: dict[str, SurveyTool],
+    courses: dict[str, PlanSettings],
 ) -> HeadRow:
     values = {key: _number(where, key, cells[key]) for key in NUMBERS if cells.get(key)}
     status = _status(where, cells.get("state", ""))
@@ -124,15 +140,15 @@ def _head(
         depths = depth_reference(read_from, answer, values.get("depth_reference_height_m", height))
     except SurveyError as error:
         raise SurveyError(f"{where}: {error}") from None
-    design = ColumnDesign(
-        name,
-        (float(head[0]), float(head[1]), values.get("down_m", 0.0)),
-        math.radians(values["inclination_deg"]) if "inclination_deg" in values else defaults.inclination,
-        math.radians(values["azimuth_deg"]) if "azimuth_deg" in values else defaults.azimuth,
-        1.0,
-        values.get("radius_m", defaults.radius),
-        allowed,
-    )
+    place = (float(head[0]), float(head[1]), values.get("down_m", 0.0))
+    radius, course = values.get("radius_m", defaults.radius), _course(where, cells, defaults, courses)
+    if course is None:
+        inclination = math.radians(values["inclination_deg"]) if "inclination_deg" in values else defaults.inclination
+        azimuth = math.radians(values["azimuth_deg"]) if "azimuth_deg" in values else defaults.azimuth
+        design = ColumnDesign(name, place, inclination, azimuth, 1.0, radius, allowed)
+    else:
+        allowed = allowed if cells.get("tolerance") else course.to_tolerance(allowed)
+        design = ColumnDesign.of_plan(name, course.to_plan(), place, radius, allowed)
     tool = _tool(cells.get("instrument", ""), defaults, tools)
     drilled = depths.to_answer(values["drilled_to_m"]) if "drilled_to_m" in values else None
     if drilled is not None and drilled < 0.0:
@@ -144,7 +160,9 @@ def _head(
     day = _day(where, cells.get("drilled_on", ""))
     if day is not None and status in (ColumnStatus.PLANNED, ColumnStatus.NOT_DRILLED):
         raise SurveyError(f"{where}: drilled_on: stated as {status.value}, yet drilled on {day}")
-    return HeadRow(name, plan, values.get("length_m", defaults.length), _remedy(where, cells), day, depths)
+    length = values.get("length_m", defaults.length) if course is None else design.length
+    own = defaults.folder / cells["plan"] if cells.get("plan") else None
+    return HeadRow(name, plan, length, _remedy(where, cells), day, depths, own)
 
 
 def _day(where: str, text: str) -> date | None:
@@ -182,6 +200,44 @@ def _tool(name: str, defaults: Defaults, tools: dict[str, SurveyTool]) -> Survey
     if name not in tools:
         tools[name] = load_tool(str(defaults.folder / name) if name.endswith((".toml", ".json")) else name)
     return tools[name]
+
+
+def _course(
+    where: str, cells: dict[str, str], defaults: Defaults, courses: dict[str, PlanSettings]
+) -> PlanSettings | None:
+    """Plan of a row, made once for all that name it; that of the wall where the row says nothing of its axis."""
+    name, straight = cells.get("plan", ""), [key for key in STRAIGHT if cells.get(key)]
+    if not name:
+        return None if straight else defaults.course
+    if straight:
+        raise SurveyError(
+            f"{where}: {straight[0]}: expected none beside a plan, which says it, got {cells[straight[0]]!r}"
+        )
+    if name not in courses:
+        try:
+            courses[name] = read_course(defaults.folder / name)
+        except SurveyError as error:
+            raise SurveyError(f"{where}: plan: {error}") from None
+    return courses[name]
+
+
+def read_course(path: Path) -> PlanSettings:
+    """Plan of columns, which begins at their heads.
+
+    Raises
+    ------
+    SurveyError
+        Names the file, what was expected and what came.
+    """
+    from groundstation.plan_settings import read_plan  # a wall of straight columns needs none of it
+
+    found = read_plan(path)
+    if any(found.head):
+        north, east, down = found.head
+        raise SurveyError(
+            f"{path}: expected a plan that begins at the head of a column, 0 m, got {north:g}, {east:g}, {down:g} m"
+        )
+    return found
 
 
 def _remedy(where: str, cells: dict[str, str]) -> Remedy:

@@ -4,8 +4,9 @@
 
 D is the distance of a point of the reference hole from the nearest point of the offset hole, u its direction. What
 both holes err alike, global sources and those of one instrument, cancels by C_ro where they run alike, and adds where
-they run against each other. It is told at every station, and where it is least between them: holes may cross between
-two stations that are far apart. Frame: north, east, down; m. Source: Sawaryn et al., SPE 187073-PA.
+they run against each other. What a path may leave its arcs by (`hole_wander`) is a hole's own. It is told at every
+station, and where it is least between them: holes may cross between two stations that are far apart. Frame: north,
+east, down; m. Source: Sawaryn et al., SPE 187073-PA.
 """
 
 from __future__ import annotations
@@ -16,9 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
+from groundstation.survey.path.leg_wander import STEADY, LegWander
 from groundstation.survey.tools.instruments import PropagationMode
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
 from groundstation.survey.well.hole_arcs import HoleArcs
+from groundstation.survey.well.hole_wander import HoleWander
 from groundstation.survey.well.leg_errors import LegErrors, SourceKey, leg_errors
 from groundstation.survey.well.methods import check_stations, station_tangents
 from groundstation.survey.well.path_search import least_place, leg_of, sample_places
@@ -38,6 +41,7 @@ class ClearanceHole:
     legs: tuple[Leg, ...]
     radius: float  # m, of the open hole
     serial: str = ""  # number of the instrument; holes of one instrument share its systematic errors
+    wander: LegWander = STEADY  # of the path between the stations, where the instrument's model does not have it
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +117,7 @@ class HolePair:
         self._reference, self._offset, self._rule = reference, offset, rule
         self.mine, self.theirs = (_arcs(hole) for hole in (reference, offset))
         self._errors = tuple(leg_errors(hole.survey, hole.legs, site) for hole in (reference, offset))
+        self._wanders = tuple(HoleWander(hole.survey.md, hole.wander) for hole in (reference, offset))
         self._shared = [key for key in self._errors[0].constant if self._is_shared(key)]
 
     def _is_shared(self, key: SourceKey) -> bool:
@@ -137,6 +142,11 @@ class HolePair:
         unit = np.where(meet[:, None], across, apart / np.maximum(distance, TOUCHING)[:, None])
         here, there = (self._errors[0], leg, fraction), (self._errors[1], their_leg, their_fraction)
         variance = sum(_variance(*where, unit) for where in (here, there))
+        for (wander, arcs), at in zip(
+            zip(self._wanders, (self.mine, self.theirs), strict=True), ((leg, fraction), (their_leg, their_fraction)),
+            strict=True,
+        ):  # fmt: skip
+            variance = variance + wander.variances(*at) * (1.0 - np.sum(arcs.tangents(*at) * unit, axis=-1) ** 2)
         common = np.zeros(len(place))
         for key in self._shared:
             effects = [np.sum(errors.effect(key, at, f) * unit, axis=-1) for errors, at, f in (here, there)]

@@ -26,7 +26,8 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.fusion.shared import Packed, Places
+from groundstation.survey.fusion.packed import Packed
+from groundstation.survey.fusion.shared import Places
 
 Array = npt.NDArray[np.float64]
 OF_ALL = 2  # of the places of a reading, before those of the tubes below it: scale and offset

@@ -25,11 +25,12 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
+from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Direction, direction_angles
-from groundstation.survey.fusion.shared import Packed, add_shared_errors
+from groundstation.survey.fusion.shared import add_shared_errors
 from groundstation.survey.fusion.sphere_direction import tangent_errors
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
-from groundstation.survey.path.leg_wander import LegWander
+from groundstation.survey.path.leg_wander import STEADY, LegWander
 from groundstation.survey.well.arcs import arc_displacements, bend_angles, on_arc
 from groundstation.survey.well.depth_errors import EXACT, StationDepth
 from groundstation.survey.well.methods import OPPOSITE, Method, leg_displacement
@@ -51,7 +52,6 @@ NONE: Final = Packed(np.zeros((2, 0)))
 UNKNOWN: Final = np.zeros((3, 0))
 NOTHING: Final = np.zeros(0)
 FROM_ZERO: Final = np.zeros(1, np.intp)
-STEADY: Final = LegWander(0.0, 1.0)  # a path that does what its arcs do
 ALL_EXACT: Final[Mapping[float, StationDepth]] = {}
 TURNED_BACK = math.cos(math.radians(120.0))  # of the bend of one leg, beyond which it is no hole any more
 

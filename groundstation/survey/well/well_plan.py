@@ -23,6 +23,8 @@ from groundstation.survey.well.methods import station_tangents
 Array = npt.NDArray[np.float64]
 PIECE = math.radians(0.5)  # of an even build and turn, that is drawn as one arc: it is off by micrometres a metre
 SAME_MD = 1e-6  # m
+CUT = 1e-12  # m, of a plane that has been found
+CUTS = 50  # steps to it: each of them makes what is left smaller by the bend of an arc
 
 
 class PlanLeg(NamedTuple):
@@ -125,6 +127,18 @@ class WellPlan:
         tangents = self._arcs.tangents(leg, fraction)
         points = self._arcs.places(leg, fraction) + (along - within)[:, None] * tangents
         return NearestPoints(np.asarray(along, float), points, tangents)
+
+    def cross_planes(self, normal: Array, depths: Array) -> NearestPoints:
+        """Points at which planes cut a plan that never runs along them: ``depths`` (k,) along their normal (3,), m."""
+        begin, end = 0.0, float(self.positions[-1] @ normal)
+        along = self.length * (depths - begin) / (end - begin)
+        for _ in range(CUTS):
+            found = self.points_at(along)
+            step = (depths - found.points @ normal) / (found.tangents @ normal)
+            along = along + step
+            if float(np.max(np.abs(step), initial=0.0)) < CUT:
+                break
+        return self.points_at(along)
 
     def nearest(self, places: Array) -> NearestPoints:
         """Points of the plan nearest to places (k, 3), m."""

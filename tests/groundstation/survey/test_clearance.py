@@ -2,6 +2,8 @@
 
 import csv
 import math
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +13,11 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from groundstation.errors import SurveyError
+from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, Term, load_tool
 from groundstation.survey.well.clearance import ClearanceHole, HolePair, Rule, clearance_between
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
+from groundstation.survey.well.hole_wander import HoleWander
 from groundstation.survey.well.methods import Method, station_positions
 
 DATA = Path(__file__).parents[2] / "data" / "survey"
@@ -202,3 +206,53 @@ def test_courses_of_no_length_are_refused() -> None:
     )
     with pytest.raises(SurveyError, match="offset hole: station 4: expected a depth beyond 30 m, got 30 m"):
         clearance_between(hole, none, SITE)
+
+
+def drawn_departures(md: np.ndarray, std: float, length: float, share: float, draws: int) -> np.ndarray:
+    """How far holes (draws,) are off their arcs at a share of the last leg: curvatures drawn and summed twice."""
+    rng, step = np.random.default_rng(5), 0.05
+    count = round(float(md[-1]) / step)
+    kept = math.exp(-step / length)
+    curvature, direction, place = std * rng.standard_normal(draws), np.zeros(draws), np.zeros(draws)
+    directions, places = [direction], [place]
+    for _ in range(count):
+        place = place + step * direction + 0.5 * step**2 * curvature
+        direction = direction + step * curvature
+        curvature = kept * curvature + std * math.sqrt(1.0 - kept**2) * rng.standard_normal(draws)
+        directions.append(direction)
+        places.append(place)
+    at = np.round(md / step).astype(int)
+    drawn = np.zeros(draws)
+    for k, (a, b) in enumerate(pairwise(at.tolist())):
+        f, leg = (share if k == len(md) - 2 else 1.0), float(md[k + 1] - md[k])
+        # a direction that turns evenly from the one station's to the next one's
+        drawn += f * leg * directions[a] + 0.5 * f * f * leg * (directions[b] - directions[a])
+    return np.asarray(places[at[-2] + round(share * (at[-1] - at[-2]))] - drawn)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.3, 0.6, 1.0])
+def test_a_path_between_stations_wanders_as_drawn_ones_do(share: float) -> None:
+    md, wander = np.array([0.0, 10.0, 16.0, 36.0]), LegWander(0.3 * DEG, 20.0)
+    claimed = HoleWander(md, wander).variances(np.array([2]), np.array([share]))[0]
+    drawn = drawn_departures(md, wander.std, wander.length, share, 4000)
+    assert np.mean(drawn**2) == pytest.approx(claimed, rel=0.12)
+
+
+def test_the_wander_of_both_paths_is_in_the_sigma_of_their_distance() -> None:
+    wander, rule = LegWander(0.3 * DEG, 20.0), Rule(margin=0.0)
+    one, other = straight(0.0), straight(5.0)
+    still = HolePair(one, other, SITE, rule)
+    moved = HolePair(replace(one, wander=wander), replace(other, wander=wander), SITE, rule)
+    places = np.array([0.0, 0.5, 3.0, 7.4, 10.0])
+    added = moved.separations(places).sigma ** 2 - still.separations(places).sigma ** 2
+    legs, fractions = np.minimum(places.astype(int), 9), places - np.minimum(places.astype(int), 9)
+    expected = 2.0 * HoleWander(one.survey.md, wander).variances(legs, fractions)
+    np.testing.assert_allclose(added, expected, rtol=1e-9, atol=1e-15)
+    assert added[0] == 0.0
+    assert np.all(np.diff(added) > 0.0)
+    # along both it is nothing: they end tip to tip
+    below = straight(0.0)
+    below = replace(below, positions=below.positions + np.array([0.0, 0.0, 103.0]), wander=wander)
+    tip = HolePair(replace(one, wander=wander), below, SITE, rule).separations(np.array([10.0]))
+    assert float(tip.sigma[0]) == pytest.approx(0.0, abs=1e-6)

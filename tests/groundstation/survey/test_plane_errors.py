@@ -11,15 +11,11 @@ from hypothesis import strategies as st
 
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.wall.column_deviation import ColumnDesign
+from groundstation.survey.wall.column_errors import reduce_error_columns
+from groundstation.survey.wall.column_plans import Assumptions, ColumnPlan, ColumnSurvey
 from groundstation.survey.wall.judged_wall import judge_wall
 from groundstation.survey.wall.plane_errors import PlaneErrors
-from groundstation.survey.wall.wall_columns import (
-    Assumptions,
-    ColumnPlan,
-    ColumnSurvey,
-    build_wall,
-    reduce_error_columns,
-)
+from groundstation.survey.wall.wall_columns import build_wall
 from groundstation.survey.wall.wall_errors import COLUMNS, PLACES, batch_groups
 from groundstation.survey.wall.wall_file import read_wall
 

@@ -1,7 +1,6 @@
 """Direction of a stop from its specific force and yaw, against known answers and against sampling."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +8,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
+from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import (
     Direction,
     Quality,
@@ -19,6 +19,7 @@ from groundstation.survey.fusion.resolve import (
     is_covariance,
     resolve_direction,
 )
+from groundstation.survey.fusion.sphere_direction import SphereDirection, stds_of_directions
 
 G = 9.81
 DEG = math.pi / 180.0
@@ -37,6 +38,11 @@ def force_at_rest(inclination: float, azimuth: float, yaw: float) -> np.ndarray:
 
 def direction_of(force: np.ndarray, yaw: float) -> Direction:
     return resolve_direction(force, np.eye(3) * 1e-9, yaw, 0.0).direction
+
+
+def tangent_of(force: np.ndarray, yaw: float) -> np.ndarray:
+    direction = direction_of(force, yaw)
+    return np.array([*direction.lean, direction.down])
 
 
 @pytest.mark.parametrize("azimuth_deg", [0.0, 90.0, 180.0, 270.0])
@@ -74,12 +80,13 @@ def test_a_vertical_tube_has_a_lean_of_zero_and_no_azimuth() -> None:
     direction = resolve_direction(np.array([0.0, 0.0, -G]), np.eye(3) * 1e-6, 1.0, 1e-4).direction
     assert np.all(direction.lean == 0.0)
     _, sigma_azimuth = angle_stds(direction.lean, direction.down, direction.cov)
+    assert stds_of_directions([direction])[0][1] == math.pi
     assert sigma_azimuth == math.pi
     assert np.all(np.isfinite(direction.cov))
 
 
 @given(
-    inclination=st.floats(0.0, 1.5),
+    inclination=st.floats(0.0, math.pi),
     azimuth=st.floats(0.0, 6.28),
     yaw=st.floats(-7.0, 7.0),
     size=st.floats(0.5, 20.0),
@@ -89,10 +96,10 @@ def test_what_an_error_does_is_the_slope_of_the_direction(
 ) -> None:
     force, step = force_at_rest(inclination, azimuth, yaw) * size / G, 1e-5
     found = resolve_direction(force, np.eye(3), yaw, 0.0)
-    by_yaw = (direction_of(force, yaw + step).lean - direction_of(force, yaw - step).lean) / (2.0 * step)
+    by_yaw = (tangent_of(force, yaw + step) - tangent_of(force, yaw - step)) / (2.0 * step)
     np.testing.assert_allclose(found.by_yaw, by_yaw, atol=1e-8)
     for axis, unit in enumerate(np.eye(3) * step):
-        slope = (direction_of(force + unit, yaw).lean - direction_of(force - unit, yaw).lean) / (2.0 * step)
+        slope = (tangent_of(force + unit, yaw) - tangent_of(force - unit, yaw)) / (2.0 * step)
         np.testing.assert_allclose(found.by_force[:, axis], slope, atol=1e-8)
 
 
@@ -102,7 +109,7 @@ def test_covariance_of_the_lean_is_what_sampling_gives() -> None:
     inclination, azimuth, yaw = 3.0 * DEG, 70.0 * DEG, 200.0 * DEG
     force, force_std, yaw_std, joint_std = force_at_rest(inclination, azimuth, yaw), 3e-3, 0.3 * DEG, 0.2 * DEG
     resolved = resolve_direction(force, np.eye(3) * force_std**2, yaw, yaw_std**2)
-    claimed = replace(resolved.direction, shared=joint_std * resolved.by_yaw[:, None])
+    claimed = SphereDirection(resolved.tangent, resolved.cov, Packed(joint_std * resolved.by_yaw[:, None]))
     samples = np.array(
         [
             direction_of(
@@ -121,8 +128,8 @@ def test_covariance_of_the_lean_is_what_sampling_gives() -> None:
 def test_a_direction_keeps_its_random_part_apart_from_what_it_shares() -> None:
     resolved = resolve_direction(force_at_rest(0.1, 1.0, 2.0), np.eye(3) * 1e-6, 2.0, 1e-6)
     assert resolved.direction.shared.shape == (2, 0)
-    shared = np.array([[1e-3, 0.0], [0.0, 2e-3]])
-    lean = replace(resolved.direction, shared=shared)
+    shared = np.array([[1e-3, 0.0], [0.0, 2e-3], [0.0, 0.0]])
+    lean = SphereDirection(resolved.tangent, resolved.cov, Packed(shared))
     np.testing.assert_array_equal(lean.cov, resolved.direction.cov)
     np.testing.assert_allclose(lean.total_cov - lean.cov, np.diag([1e-6, 4e-6]), atol=1e-18)
 
@@ -176,9 +183,20 @@ def test_a_matrix_alone_is_judged_as_among_many(k: int, entries: list[float], ex
     assert is_covariance(cov) == is_covariance(np.repeat(cov[None], 100, axis=0))
 
 
-def test_a_direction_without_uncertainty_across_the_lean_is_no_survey() -> None:
-    with pytest.raises(SurveyError, match="lean"):
-        resolve_direction(np.array([G, 0.0, 0.0]), np.eye(3) * 1e-6, 0.0, 1e-6)
+def test_a_direction_without_uncertainty_across_the_tube_is_no_survey() -> None:
+    with pytest.raises(SurveyError, match="across the tube"):
+        resolve_direction(force_at_rest(0.5, 0.0, 0.0), np.zeros((3, 3)), 0.0, 1e-6)
+
+
+@pytest.mark.parametrize("inclination_deg", [0.5, 30.0, 89.999, 90.0, 90.001, 135.0, 179.5])
+def test_the_sigma_of_an_inclination_is_that_of_the_force_at_every_inclination(inclination_deg: float) -> None:
+    """An accelerometer's noise over gravity, whatever the yaw; the azimuth's is the yaw's where the tube lies flat."""
+    force = force_at_rest(inclination_deg * DEG, 2.0, 0.3)
+    found = resolve_direction(force, np.eye(3) * 1e-6, 0.3, (7.0 * DEG) ** 2).direction
+    ((inclination, azimuth),) = stds_of_directions([found])
+    assert inclination == pytest.approx(1e-3 / G, rel=1e-9)
+    across = 1e-3 / G / math.sin(inclination_deg * DEG)
+    assert azimuth == pytest.approx(math.hypot(7.0 * DEG, across), rel=1e-9)
 
 
 def test_quality_names_what_is_wrong() -> None:

@@ -12,15 +12,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from groundstation.survey.fusion.fusion import fuse_by_bayes
+from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Direction, Resolved, resolve_direction
-from groundstation.survey.fusion.shared import (
-    KIND_NAMES,
-    Fused,
-    Packed,
-    SharedErrors,
-    add_shared_errors,
-    widen_shared_errors,
-)
+from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors, add_shared_errors, widen_shared_errors
+from groundstation.survey.fusion.sphere_direction import SphereDirection
 from groundstation.survey.well.ellipsoid import coverage_radius
 from groundstation.survey.well.methods import Method
 from groundstation.survey.well.trajectory import Trajectory
@@ -42,7 +37,8 @@ def stop(inclination: float = 0.2, azimuth: float = 1.0, yaw: float = 0.4) -> Re
 def common_yaw_var(one: Direction, other: Direction) -> float:
     """Variance (rad^2) of the yaw error that two readings of the same stop have in common."""
     by_yaw = stop().by_yaw
-    return float(by_yaw @ (one.shared[:, : other.shared.shape[1]] @ other.shared[:, : one.shared.shape[1]].T) @ by_yaw)
+    columns, others = (padded[:, : min(one.width, other.width)] for padded in (one.shared, other.shared))
+    return float(by_yaw[:2] @ (columns @ others.T) @ by_yaw[:2])
 
 
 def yaw_only(errors: SharedErrors, tube: int, above: list[int] | None, joints: float, mount: float = 0.0) -> Direction:
@@ -109,7 +105,9 @@ def test_biases_of_an_accelerometer_are_those_of_its_tube() -> None:
     errors, resolved, std = SharedErrors(), stop(), 3e-3
     one, again = (errors.direction_of(resolved, 1, [2], 0.0, 0.0, std) for _ in range(2))
     other = errors.direction_of(resolved, 2, [], 0.0, 0.0, std)
-    np.testing.assert_allclose(one.shared @ one.shared.T, std**2 * resolved.by_force @ resolved.by_force.T, rtol=1e-12)
+    np.testing.assert_allclose(
+        one.shared @ one.shared.T, std**2 * (resolved.by_force @ resolved.by_force.T)[:2, :2], rtol=1e-12
+    )
     np.testing.assert_array_equal(one.shared, again.shared)
     assert not np.any(one.shared @ other.shared[:, : one.shared.shape[1]].T)
 
@@ -137,7 +135,7 @@ def test_the_constant_yaw_variance_of_a_reading_is_all_there_and_no_more(
 ) -> None:
     resolved, errors = stop(0.3, 2.0, yaw), SharedErrors()
     lean = errors.direction_of(resolved, 1, above, systematic_var, mount_var, 0.0)
-    expected = systematic_var * np.outer(resolved.by_yaw, resolved.by_yaw)
+    expected = systematic_var * np.outer(resolved.by_yaw, resolved.by_yaw)[:2, :2]
     np.testing.assert_allclose(lean.shared @ lean.shared.T, expected, rtol=1e-9, atol=1e-20)
     np.testing.assert_array_equal(lean.lean, resolved.direction.lean)
     np.testing.assert_array_equal(lean.cov, resolved.direction.cov)
@@ -171,11 +169,11 @@ def test_the_kinds_add_up_to_the_whole(readings: list[tuple[int, list[int] | Non
 
 def test_each_kind_holds_what_is_of_its_kind() -> None:
     errors, resolved = SharedErrors(), stop()
-    yaw = resolved.by_yaw**2
+    yaw = resolved.by_yaw[:2] ** 2
     kinds = by_kind(errors, errors.direction_of(resolved, 1, [2, 3], 5e-4, 2e-4, 1e-3).shared)
     np.testing.assert_allclose(kinds["mounts"], 2e-4 * yaw, rtol=1e-9)
     np.testing.assert_allclose(kinds["joints"], 3e-4 * yaw, rtol=1e-9)
-    biases = 1e-6 * (resolved.by_force**2).sum(axis=1)
+    biases = 1e-6 * (resolved.by_force[:2] ** 2).sum(axis=1)
     np.testing.assert_allclose(kinds["accelerometer_bias"], biases, rtol=1e-9)
 
 
@@ -193,7 +191,7 @@ def test_packed_columns_are_the_same_when_they_are_unpacked(columns: np.ndarray)
 def test_many_columns_of_which_few_are_known_take_little_room() -> None:
     columns = np.zeros((2, 70_000))
     columns[:, [3, 69_999]] = [[1.0, 2.0], [3.0, 4.0]]
-    np.testing.assert_array_equal(Fused(np.zeros(2), 1.0, np.eye(2), Packed(columns)).shared, columns)
+    np.testing.assert_array_equal(SphereDirection(np.eye(3)[2], np.eye(3), Packed(columns)).shared, columns)
     tracemalloc.start()
     kept = [Packed(columns) for _ in range(100)]
     held, _ = tracemalloc.get_traced_memory()

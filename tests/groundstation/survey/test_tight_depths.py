@@ -9,10 +9,11 @@ import pytest
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.wall.column_deviation import ColumnDesign
+from groundstation.survey.wall.column_plans import Assumptions, ColumnPlan, ColumnSurvey
 from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.judged_wall import judge_wall
 from groundstation.survey.wall.tight_depths import TightRange
-from groundstation.survey.wall.wall_columns import Assumptions, ColumnPlan, ColumnSurvey, build_wall
+from groundstation.survey.wall.wall_columns import build_wall
 from groundstation.survey.wall.wall_file import Wall, read_wall
 from groundstation.survey.wall.wall_verdict import FindingKind, Judgement, WallVerdict, judge_columns
 

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
+from groundstation.survey.bearings import planes_across
 from groundstation.survey.fusion.resolve import known_direction
 from groundstation.survey.path.curvature_prior import CurvaturePrior
 from groundstation.survey.path.curvature_tendency import learn_curvature
@@ -15,7 +16,6 @@ from groundstation.survey.wall.column_deviation import (
     PRESETS,
     ColumnDesign,
     axis_deviations,
-    planes_across,
 )
 from groundstation.survey.wall.projected_end import project_to_target
 from groundstation.survey.well.trajectory import TrajectoryPoint
