@@ -163,7 +163,13 @@ def grown_start(start: StartingPoint, used: Places, count: int, string: StringPr
     legs = np.full(count - 1, start.curvature_var)
     legs[known[1:] - 1] = start.leg_vars
     return replace(
-        start, tangents=start.tangents[nearest], curvatures=curvatures, tubes=tubes, make_ups=make_ups, leg_vars=legs
+        start,
+        tangents=start.tangents[nearest],
+        curvatures=curvatures,
+        tubes=tubes,
+        make_ups=make_ups,
+        leg_vars=legs,
+        is_learnt=True,
     )
 
 

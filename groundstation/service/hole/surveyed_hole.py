@@ -159,7 +159,7 @@ class SurveyedHole:
         history = self._history
         if not (self._is_adjusted and self._is_behind):
             history.add(self.deviations, self.projection)
-        elif (kept := history.take_over()) is not None:
+        elif (kept := history.take_over(len(self._stops))) is not None:
             if len(kept.where) > 1:
                 self._alarms.judge_deviation(kept.worst(first=1), kept.at)
             if (end := kept.projection) is not None:

@@ -48,6 +48,7 @@ ADVICE: Mapping[BlunderKind, str] = {
     **dict.fromkeys((K.JOINT_SLIPPED, K.JOINT_MISREAD), "read the mark above tube {tube} again and tell that joint"),
     K.ENCODER_SLIPPED: "look at belt and counter of the encoder, and tell north again",
     K.HOLE_MOVED: "survey again: what was read there before counts as of then",
+    K.COLLAR_WRONG: "measure the direction at the collar and north again, and tell them",
     K.DEPTH_WRONG_ONCE: "go on, it is put right; measure the depth by hand at the next stop",
     K.DEPTH_WRONG_FROM: "measure the depth by hand, and put its source right",
     K.AXES_EXCHANGED: "go on, it is put right; look at the sensor of tube {tube} when it is out",

@@ -137,7 +137,7 @@ def examine_hole(
     known : blunders that were found before, which are taken in; a doubt among them is judged again
     """
     known = tuple(_judged_again(looks, string, path, run, known, place) for place in range(len(known)))
-    now = adjust_with(looks, string, path, run, _taken_in(known), start)
+    now = _begun(looks, string, path, run, _taken_in(known), start)
     found, suspicion = list(known), None
     while suspicion is None and len(found) < MOST_BLUNDERS and is_suspicious(now.found, run):
         blunder = find_blunder(looks, string, path, run, now, _taken_in(found))
@@ -150,6 +150,24 @@ def examine_hole(
         now = adjust_with(looks, string, path, run, _taken_in([*found, *filter(None, [suspicion])]), now.found.now)
     blunders = tuple(_resized(one, now, _taken_in(found)) for one in found)
     return Examination(now.found, blunders, suspicion)
+
+
+def _begun(
+    looks: Looks,
+    string: StringPrior,
+    path: PathPrior,
+    run: RunOfStops,
+    taken_in: tuple[Hypothesis, ...],
+    start: StartingPoint | None,
+) -> TakenIn:
+    """A hole adjusted with what is known to be wrong; before more is blamed, play and bends are learnt of all looks."""
+    if start is None or not start.is_learnt:
+        return adjust_with(looks, string, path, run, taken_in, start)
+    if not taken_in:
+        now = adjust_with(looks, string, path, run, (), start)
+        if not is_suspicious(now.found, run):
+            return now
+    return adjust_with(looks, string, path, run, taken_in, replace(start, is_learnt=False))
 
 
 def examine_known(
@@ -170,7 +188,7 @@ def examine_known(
     before : of fewer looks, whose stations, stops and tubes have the places that they had
     """
     known, suspicion = ((), None) if before is None else (before.blunders, before.suspicion)
-    now = adjust_with(looks, string, path, run, _taken_in([*known, *filter(None, [suspicion])]), start)
+    now = _begun(looks, string, path, run, _taken_in([*known, *filter(None, [suspicion])]), start)
     blunders = tuple(_resized(one, now, _taken_in(known)) for one in known)
     return Examination(now.found, blunders, suspicion), is_suspicious(now.found, run)
 

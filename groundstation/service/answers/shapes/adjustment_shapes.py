@@ -27,7 +27,7 @@ class BlunderRow:
     misfit_after: Annotated[float, "of all surveys with it"]
     best: Annotated[str, "best explanation in words"]
     second: Annotated[str | None, "second best in words, and how likely it is beside the best"]
-    moved_cm: Annotated[float | None, "by which the toe would be elsewhere were it not put right; null of a known size"]
+    moved_cm: Annotated[float | None, "by which the toe would be elsewhere without it put right; null if not known"]
     sigma_cm: Annotated[float | None, "standard deviation that it adds at the toe, since its size is not known exactly"]
     todo: Annotated[str, "what to do about it"]
 

@@ -398,7 +398,7 @@ export interface BlunderRow {
   best: string;
   /** second best in words, and how likely it is beside the best */
   second: string | null;
-  /** by which the toe would be elsewhere were it not put right; null of a known size */
+  /** by which the toe would be elsewhere without it put right; null if not known */
   moved_cm: number | null;
   /** standard deviation that it adds at the toe, since its size is not known exactly */
   sigma_cm: number | null;
@@ -431,7 +431,7 @@ export interface ToePart {
 /** A mistake that may be made at the last stop, of its kind the one that does most at the toe when not found. */
 export interface LeastFound {
   /** what would be wrong */
-  kind: "bias_stepped" | "bias_creeps" | "bias_wrong" | "tilt_slipped" | "tilt_wrong" | "mount_turned" | "mount_misread" | "joint_slipped" | "joint_misread" | "encoder_slipped" | "hole_moved" | "depth_wrong_once" | "depth_wrong_from" | "axes_exchanged" | "tubes_exchanged" | "look_wrong";
+  kind: "bias_stepped" | "bias_creeps" | "bias_wrong" | "tilt_slipped" | "tilt_wrong" | "mount_turned" | "mount_misread" | "joint_slipped" | "joint_misread" | "encoder_slipped" | "hole_moved" | "depth_wrong_once" | "depth_wrong_from" | "axes_exchanged" | "tubes_exchanged" | "look_wrong" | "collar_wrong";
   /** what it is of, such as a tube; empty of all */
   subject: string;
   /** size from which on it would be found; null if nothing can tell */
@@ -490,6 +490,8 @@ export interface AdjustmentAnswer {
   toe_md_m: number | null;
   /** standard deviation at the toe, the larger of north and east */
   sigma_toe_cm: number | null;
+  /** surveys by which it was looked for what is wrong; of the newest that may still go on */
+  searched: number;
   blunders: BlunderRow[];
   toe: ToeShare[];
   parts: ToePart[];
