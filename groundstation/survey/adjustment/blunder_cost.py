@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunders import Blunder, Examination
-from groundstation.survey.adjustment.hypotheses import BlunderKind
 from groundstation.survey.adjustment.taken_in import places_among_further
 from groundstation.survey.adjustment.toe_weights import toe_weights
 
