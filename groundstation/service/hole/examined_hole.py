@@ -23,6 +23,7 @@ LEVEL = 2  # of north, east and down those across a hole
 OF_TUBE = (ShareSource.BIAS, ShareSource.TILT)
 LARGEST_STEP = 0.2  # m/s^2, by which an accelerometer that was knocked may step: 20 mg
 STEP = BlunderKind.BIAS_STEPPED
+UNEVEN = (BlunderKind.ENCODER_DRIFTS,)  # whose size is one for all stops, and not quite so
 UNSOLVED = (
     "the surveys cannot be adjusted to each other, so every station stands for itself and nothing is found that is "
     "wrong: check what was told of the rig, and the newest surveys"
@@ -55,8 +56,9 @@ class ExaminedHole:
 
     @property
     def doubts(self) -> list[str]:
-        """Sentences of what may be one thing or another."""
-        return [self.sentence(one) for one in self.examination.blunders if one.is_doubt]
+        """Sentences of what may be one thing or another, or goes on by no two stops alike, as a belt that slips."""
+        blunders = self.examination.blunders
+        return [self.sentence(one) for one in blunders if one.is_doubt or one.best.hypothesis.kind in UNEVEN]
 
     def subject(self, one: Hypothesis) -> str:
         """What a blunder is of: a tube, the hole, the collar, the depth or the encoder."""

@@ -27,6 +27,7 @@ SENTENCES: Mapping[BlunderKind, str] = {
     K.JOINT_SLIPPED: "joint above tube {tube} slipped by {size} from the stop at {depth} on",
     K.JOINT_MISREAD: "angle of the joint above tube {tube} is off by {size}, more than was told of it",
     K.ENCODER_SLIPPED: "encoder slipped by {size} from the stop at {depth} on",
+    K.ENCODER_DRIFTS: "encoder slips by {size} at every stop",
     K.HOLE_MOVED: "hole moved by {size} between {first} and {last} before the stop at {depth}",
     K.DEPTH_WRONG_ONCE: "depth at the stop at {depth} is off by {size}",
     K.DEPTH_WRONG_FROM: "depth is off by {size} from the stop at {depth} on",

@@ -37,7 +37,8 @@ def test_the_score_is_that_of_what_the_stations_say_without_it(off_deg: float) -
     off = bases @ (path.collar - found.now.tangents[0])
     cov = found.covs[0, :2, :2] + bases @ path.collar_cov @ bases.T
     assert departure.told == 2
-    assert departure.squares == pytest.approx(off @ np.linalg.solve(cov, off), rel=0.03, abs=0.03)
+    # the two have learnt how much the hole bends from legs that differ by the first
+    assert departure.squares == pytest.approx(off @ np.linalg.solve(cov, off), rel=0.1, abs=0.05)
 
 
 def test_a_collar_that_was_told_wrong_is_named_and_counts_no_more() -> None:

@@ -375,7 +375,7 @@ export interface UncertaintyAnswer {
 /** Something that is wrong with the hole or its string. */
 export interface BlunderRow {
   /** what explains the contradiction best */
-  kind: "bias_stepped" | "bias_creeps" | "bias_wrong" | "tilt_slipped" | "tilt_wrong" | "mount_turned" | "mount_misread" | "joint_slipped" | "joint_misread" | "encoder_slipped" | "hole_moved" | "depth_wrong_once" | "depth_wrong_from" | "axes_exchanged" | "tubes_exchanged" | "look_wrong" | "collar_wrong";
+  kind: "bias_stepped" | "bias_creeps" | "bias_wrong" | "tilt_slipped" | "tilt_wrong" | "mount_turned" | "mount_misread" | "joint_slipped" | "joint_misread" | "encoder_slipped" | "encoder_drifts" | "hole_moved" | "depth_wrong_once" | "depth_wrong_from" | "axes_exchanged" | "tubes_exchanged" | "look_wrong" | "collar_wrong";
   /** what it is of, such as a tube; empty of all */
   subject: string;
   /** depth of the bit at the stop from which on, or at which, it is wrong */
