@@ -15,6 +15,7 @@ import pytest
 import yaml
 
 from borechain.__main__ import cli
+from borechain.studies.rig_study_table import RIG_STUDIES
 from node.process.command_group import commands
 from sim.studies.study_table import STUDIES
 
@@ -65,7 +66,10 @@ def test_every_result_has_one_caption_and_every_caption_its_file() -> None:
     assert sorted(names) == sorted(p.name for p in RESULTS.iterdir() if p.name != "README.md")
 
 
-@pytest.mark.parametrize("command", [f"{s.name} {words}".strip() for s in STUDIES.values() for words in s.full])
+CAPTIONED = [*STUDIES.values(), RIG_STUDIES["blunders"]]
+
+
+@pytest.mark.parametrize("command", [f"{s.name} {words}".strip() for s in CAPTIONED for words in s.full])
 def test_a_caption_names_the_command_as_it_is_run(command: str) -> None:
     assert f"`{command}`" in captions()
 

@@ -13,6 +13,7 @@ from click.testing import CliRunner, Result
 
 from borechain.cli.calibrate.calibrate import calibrate
 from borechain.cli.experiment.experiment import experiment
+from borechain.studies.rig_study_table import RIG_STUDIES
 from sim.errors import RigError, TableError
 from sim.instruments.instrument import Instrument
 from sim.instruments.instrument_table import INSTRUMENTS
@@ -25,8 +26,9 @@ RESULTS = Path(__file__).parents[2] / "docs" / "results"
 # the longest with two seeds; the modes share the code of two-nodes, the others have tests of their own
 LONG = {
     *("ingredients", "update-modes", "single-updates", "fifty-nodes", "delay", "consistency", "outage", "bent-holes"),
-    "worlds",
+    *("worlds", "blunders"),
 }
+KEPT = [*STUDIES.values(), RIG_STUDIES["blunders"]]  # those with a table among the results
 STUDY = """
     from groundstation.report.style import new_figure
 
@@ -137,7 +139,7 @@ def costs(study: Study) -> list[pytest.MarkDecorator]:
     return [pytest.mark.statistical] if study.name in LONG else [pytest.mark.slow]
 
 
-@pytest.mark.parametrize("study", [pytest.param(s, id=s.name, marks=costs(s)) for s in STUDIES.values()])
+@pytest.mark.parametrize("study", [pytest.param(s, id=s.name, marks=costs(s)) for s in KEPT])
 def test_every_study_runs_with_few_seeds_and_keeps_what_its_line_says(study: Study, tmp_path: Path) -> None:
     done = ask(study.name, *shlex.split(study.short), "--out", tmp_path, "--json")
     assert done.exit_code == 0, done.output
@@ -158,7 +160,7 @@ def test_every_study_runs_with_few_seeds_and_keeps_what_its_line_says(study: Stu
 
 
 def test_the_arguments_of_make_study_are_ones_that_the_studies_take() -> None:
-    for study in STUDIES.values():
+    for study in KEPT:
         command = experiment.get_command(None, study.name)  # type: ignore[arg-type]
         for words in study.full:
             command.make_context(study.name, shlex.split(words))  # type: ignore[union-attr]

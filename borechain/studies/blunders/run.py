@@ -116,7 +116,7 @@ def blunder_row(kind: PlantedBlunder, size: int, runs: Sequence[BlunderRun]) -> 
         "beyond_on_target": on_target,
         "worst_sigmas": float(np.median([run.worst for run in runs])),
         "direction_sigmas": float(np.median([run.direction for run in runs])),
-        "toe_mm": float(np.nanmedian([run.toe_mm for run in runs])),
+        "toe_mm": median_toe(runs),
         "causes": most_common_causes(runs),
         "seen_by": kind.seen_by,
     }
@@ -137,10 +137,16 @@ def honest_row(runs: Sequence[BlunderRun]) -> dict[str, Any]:
         "beyond_on_target": sum(run.answer.word == "on_target" for run in beyond),
         "worst_sigmas": float(np.median([run.worst for run in runs])),
         "direction_sigmas": float(np.median([run.direction for run in runs])),
-        "toe_mm": float(np.nanmedian([run.toe_mm for run in runs])),
+        "toe_mm": median_toe(runs),
         "causes": most_common_causes(runs),
         "seen_by": "",
     }
+
+
+def median_toe(runs: Sequence[BlunderRun]) -> float | None:
+    """Median error of the toe, mm; None where no hole was surveyed."""
+    found = [run.toe_mm for run in runs if math.isfinite(run.toe_mm)]
+    return float(np.median(found)) if found else None
 
 
 def most_common_causes(runs: Sequence[BlunderRun]) -> str:
