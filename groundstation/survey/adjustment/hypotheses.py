@@ -89,8 +89,8 @@ def effect_of(
 ) -> tuple[Places, Array]:
     """Looks (r,) that a hypothesis changes, and the change (r, 3, q) of their force for one unit of it.
 
-    Units are m/s^2 (a second, of a creep), rad (a stop, of a drift), m, or one for what has a known size. Of a depth that is wrong by about
-    ``reach`` (m) it is the mean change over that length.
+    Units are m/s^2 (a second, of a creep), rad (a stop, of a drift), m, or one for what has a known size. Of a depth
+    that is wrong by about ``reach`` (m) it is the mean change over that length.
     """
     amplitude = effect_amplitudes(one, looks, run)
     rows = np.flatnonzero(amplitude)
