@@ -62,7 +62,7 @@ class GroundConfig(BaseModel):
         None, description="of an IMU against its tube's axis until it is aligned; as mounted, 0.5, if absent"
     )
     weighting: Weighting = Field(
-        Weighting.BAYES, description="how the readings of one station count, or all of the hole in one adjustment"
+        Weighting.ADJUSTED, description="how the readings of one station count, or all of the hole in one adjustment"
     )
     play_std_deg: Positive = Field(0.01, description="of a tube against the hole at a stop, until the looks tell it")
     curvature_std_deg_per_m: Positive = Field(0.3, description="of the hole's curvature, before the looks")

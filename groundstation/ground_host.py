@@ -53,7 +53,7 @@ def run_ground(
         config = checked_config(**given, **settings)
         load_kernels()
         with (
-            contextlib.closing(start_ground_process(config)) as process,
+            contextlib.closing(start_ground_process(config, searches_apart=own_clock)) as process,
             page_of(page) as serve_page,
             rig_session(place, file_name(BASE)) as bus,
         ):
@@ -80,12 +80,12 @@ def load_kernels() -> None:
     warm_adjustment()
 
 
-def start_ground_process(config: GroundConfig) -> GroundProcess:
+def start_ground_process(config: GroundConfig, *, searches_apart: bool = False) -> GroundProcess:
     """Return a ground station with everything computed and the longest answer made once, so that no first query waits.
 
     Nor does one wait for a garbage collection over what was imported and restored (0.1 s of ten thousand surveys).
     """
-    process = GroundProcess(config)
+    process = GroundProcess(config, searches_apart=searches_apart)
     process.operator.ask_json("measurements")
     gc.freeze()
     return process

@@ -12,7 +12,7 @@ from hand_fed import Rig
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from schemas import check_answers, shown_on
-from test_model import Placed, inclination_deg, knowing, passes, survey
+from string_passes import Placed, inclination_deg, knowing, passes, survey
 from test_surveyed_biases import MILLI_G, STOPS, Drilled
 
 from groundstation.config import GroundConfig
@@ -120,9 +120,9 @@ def test_an_answer_of_nothing_is_empty(tmp_path: Path) -> None:
 
 
 def test_stations_that_are_fused_one_by_one_are_adjusted_beside(tmp_path: Path) -> None:
-    """By default stations are fused one by one; what the tubes say about each other can be asked for all the same."""
+    """Where stations are fused one by one, what the tubes say about each other can be asked for all the same."""
     measurements: list[Placed] = passes(4, lambda _stop, _station: 1.0)
-    model = knowing(tmp_path, measurements, 4)
+    model = knowing(tmp_path, measurements, 4, weighting="bayes")
     assert not model.hole.is_adjusted
     assert shown_on(model, "adjustment")["surveys"] == len(measurements)
 

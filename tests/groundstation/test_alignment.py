@@ -12,6 +12,7 @@ from groundstation.config import GroundConfig
 from groundstation.service.answers.model import RigModel
 from groundstation.service.hole.resolving import force_vars
 from groundstation.service.orders.order_book import SentOrder
+from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import combine_imus
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import RigContext
@@ -96,7 +97,7 @@ def test_two_imus_of_a_process_arrive_as_two_means(tmp_path: Path) -> None:
 
 
 def test_the_ground_station_weighs_all_imus_of_a_survey() -> None:
-    model = RigModel.begin(GroundConfig(folder=Path(), tube_length=2.0))
+    model = RigModel.begin(GroundConfig(folder=Path(), tube_length=2.0, weighting=Weighting.BAYES))
     assert model.string.depths.add_stand(Stand(model.string.time.epoch, 999.0, 1001.0, 2.0))
     lean, variances = 2.0 * DEG, (1e-8, 3e-8)
     imus = tuple(

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hand_fed import TOLD
+from hand_fed import FOLLOWED, TOLD
 from schemas import check_answers, shown_on
-from test_model import survey
+from string_passes import survey
 
 from borechain.drilling.inline import InlineRig
 from groundstation.config import GroundConfig
@@ -38,7 +38,7 @@ def passes(stops: int) -> list[Placed]:
 
 
 def model_of(folder: Path, placed: list[Placed], **settings: Any) -> RigModel:
-    model = RigModel.begin(GroundConfig(folder=folder, **TOLD | settings))
+    model = RigModel.begin(GroundConfig(folder=folder, **TOLD | FOLLOWED | settings))
     model.string.tally.restore([5, 4, 3, 2, 1])
     for measurement, md in placed:
         assert model.placement.place_one(measurement, md) == ""

@@ -250,7 +250,7 @@ def test_any_line_is_an_alarm_or_refused(data: Any) -> None:
 
 @pytest.fixture
 def rig(tmp_path: Path) -> Rig:
-    rig = Rig(tmp_path, target=20.0)
+    rig = Rig(tmp_path, target=20.0, curvature_std_deg_per_m=3.0)
     rig.run(5.0)
     for stop, inclination_deg in ((1, 0.3), (2, 6.0)):
         rig.drill(stop, inclination_deg)
@@ -277,7 +277,7 @@ def test_orders_change_an_alarm_and_a_restart_does_not(rig: Rig, tmp_path: Path)
         order(rig, alarm["number"], "acknowledge", "bert")
     before = opened(rig)
     rig.ground.close()
-    again = Rig(tmp_path, target=20.0)
+    again = Rig(tmp_path, target=20.0, curvature_std_deg_per_m=3.0)
     again.now = rig.now
     again.run(2.0)
     after = opened(again)
@@ -311,7 +311,7 @@ def test_a_database_of_before_the_alarms_is_read_and_keeps_them_from_now_on(rig:
         connection.execute(sa.text("drop table alarms"))
         connection.execute(sa.text("update meta set value = '2' where name = 'schema'"))
     engine.dispose()
-    again = Rig(tmp_path, target=20.0)
+    again = Rig(tmp_path, target=20.0, curvature_std_deg_per_m=3.0)
     again.now = rig.now
     again.run(2.0)
     assert "projection" not in opened(again)

@@ -3,172 +3,24 @@
 import math
 import pickle
 import random
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hand_fed import TOLD
+from hand_fed import FOLLOWED
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from schemas import check_answers, shown_on
+from schemas import shown_on
+from string_passes import BETWEEN_STOPS, COV, DEG, differing, knowing, passes, result, survey
+from test_movement import moving
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
 from groundstation.service.answers.model import RigModel
 from groundstation.service.string.stored import Stored
-from groundstation.survey.fusion.resolve import direction_angles
 from groundstation.survey.well.ellipsoid import plan_ellipse
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
-
-G = 9.81
-DEG = math.pi / 180.0
-VAR = (0.0034**2) / 32
-COV = ((VAR, 0.0, 0.0), (0.0, VAR, 0.0), (0.0, 0.0, VAR))
-BETWEEN_STOPS = 600.0  # s
-Placed = tuple[SurveyMeasurement, float]
-
-
-def survey(
-    tube: int, stop: int, hops: int, inclination_deg: float, azimuth_deg: float = 0.0, apart: float = 0.5
-) -> SurveyMeasurement:
-    """One IMU of a tube at a stop; the tubes answer one after the other."""
-    inclination, azimuth, yaw = inclination_deg * DEG, azimuth_deg * DEG, 0.3 * tube
-    s = math.sin(inclination)
-    force = (G * s * math.cos(azimuth - yaw), G * s * math.sin(azimuth - yaw), -G * math.cos(inclination))
-    return SurveyMeasurement(
-        tube, stop, BETWEEN_STOPS * stop + apart * tube, hops, (ImuMean(force, COV),), yaw, (0.01 * DEG) ** 2,
-        (0.1 * DEG) ** 2, 32, 20.0, NodeFlag.NONE,
-    )  # fmt: skip
-
-
-def passes(stops: int, inclination_deg: Callable[[int, int], float], apart: float = 0.5) -> list[Placed]:
-    """Tube 1 is at the bit and one tube is added on top a stop: at stop t tube k is at station t - k + 1."""
-    return [
-        (
-            survey(tube, stop, stop - tube + 1, inclination_deg(stop, stop - tube + 1), apart=apart),
-            2.0 * (stop - tube + 1),
-        )
-        for stop in range(1, stops + 1)
-        for tube in range(1, stop + 1)
-    ]
-
-
-def knowing(tmp_path: Path, measurements: list[Placed], tubes: int = 0, **settings: Any) -> RigModel:
-    """RigModel of surveys in the order in which they come; the string's order is known beforehand."""
-    model = RigModel.begin(GroundConfig(folder=tmp_path, **TOLD | settings))
-    model.string.tally.restore(list(range(tubes, 0, -1)))
-    for measurement, md in measurements:
-        assert model.placement.place_one(measurement, md) == ""
-    return model
-
-
-def inclination_deg(model: RigModel, station: int) -> float:
-    fused = model.hole.direction_of(model.hole.stations[station])
-    return direction_angles(fused.lean, fused.down)[0] / DEG
-
-
-def test_readings_of_a_hole_that_stays_all_count(tmp_path: Path) -> None:
-    model = knowing(tmp_path, passes(5, lambda _stop, _station: 1.0), 5)
-    assert [(s.md, s.count, s.first) for s in model.hole.stations] == [
-        (2.0, 5, 0), (4.0, 4, 0), (6.0, 3, 0), (8.0, 2, 0), (10.0, 1, 0),
-    ]  # fmt: skip
-    assert model.hole.moved == []
-    assert [p.md for p in model.hole.trajectory] == [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]
-
-
-def moving(stops: int, at_stop: int) -> list[Placed]:
-    """A hole of 1 deg that is at 2 deg from a stop on."""
-    return passes(stops, lambda stop, _station: 2.0 if stop >= at_stop else 1.0)
-
-
-@pytest.mark.parametrize("order", ["from the bit up", "from the top down", "odd tubes first", "even tubes first"])
-@pytest.mark.parametrize("stops", [3, 4, 5, 6])
-def test_a_hole_that_moved_drops_what_was_read_before(tmp_path: Path, order: str, stops: int) -> None:
-    measurements = moving(stops, stops)
-    place: dict[str, Callable[[int], tuple[int, int]]] = {
-        "from the bit up": lambda tube: (0, tube),
-        "from the top down": lambda tube: (0, -tube),
-        "odd tubes first": lambda tube: ((tube + 1) % 2, tube),
-        "even tubes first": lambda tube: (tube % 2, tube),
-    }
-    measurements.sort(key=lambda placed: (placed[0].sequence, place[order](placed[0].tube)))
-    model = knowing(tmp_path, measurements, stops)
-    for station, known in enumerate(model.hole.stations):
-        assert inclination_deg(model, station) == pytest.approx(2.0, abs=1e-6), known.md
-        assert known.first == known.count - 1
-    assert sorted(moved.md for moved in model.hole.moved) == [2.0 * n for n in range(1, stops)]
-    assert sorted(moved.dropped for moved in model.hole.moved) == list(range(1, stops))
-
-
-def test_the_evidence_of_a_movement_is_kept(tmp_path: Path) -> None:
-    model = knowing(tmp_path, moving(4, 4), 4)
-    assert model.hole.moved
-    for moved in model.hole.moved:
-        assert moved.evidence.moved
-        assert moved.evidence.own > 10.0
-        assert 1 <= len(moved.evidence.neighbours) <= 2
-        assert min(moved.evidence.neighbours) > 10.0
-        assert moved.at == pytest.approx(4 * BETWEEN_STOPS, abs=5.0)
-
-
-def test_readings_after_a_movement_count_together(tmp_path: Path) -> None:
-    model = knowing(tmp_path, moving(6, 5), 6)
-    first = model.hole.stations[0]
-    assert (first.count, first.first) == (6, 4)
-    assert len(first.counting) == 2
-    assert inclination_deg(model, 0) == pytest.approx(2.0, abs=1e-6)
-    assert {moved.at // BETWEEN_STOPS for moved in model.hole.moved} == {5}
-
-
-@pytest.mark.parametrize("outlier", [1, 2, 3, 4])
-def test_an_outlier_at_one_station_drops_nothing(tmp_path: Path, outlier: int) -> None:
-    measurements = passes(5, lambda stop, station: 2.0 if (stop, station) == (5, outlier) else 1.0)
-    model = knowing(tmp_path, measurements, 5)
-    assert model.hole.moved == []
-    assert all(known.first == 0 for known in model.hole.stations)
-    assert 1.0 < inclination_deg(model, outlier - 1) < 2.0
-
-
-def test_stations_that_changed_to_different_sides_did_not_move(tmp_path: Path) -> None:
-    measurements = passes(5, lambda stop, station: 1.0 if stop < 5 else (2.0 if station % 2 else 0.2))
-    assert knowing(tmp_path, measurements, 5).hole.moved == []
-
-
-def test_a_neighbour_that_changed_at_another_stop_is_no_evidence(tmp_path: Path) -> None:
-    placed = [(1, 1, 2.0, 1.0), (2, 1, 4.0, 1.0), (2, 2, 4.0, 2.0), (1, 3, 2.0, 2.0)]
-    measurements = [(survey(tube, stop, 3 - tube, inclination), md) for tube, stop, md, inclination in placed]
-    assert knowing(tmp_path, measurements, 2).hole.moved == []
-    measurements.append((survey(2, 3, 1, 2.0), 4.0))
-    measurements[2] = (survey(2, 2, 1, 1.0), 4.0)
-    assert sorted(moved.md for moved in knowing(tmp_path, measurements, 2).hole.moved) == [2.0, 4.0]
-
-
-def result(model: RigModel) -> dict[str, Any]:
-    """All that follows from the surveys."""
-    stations = [(s.md, s.first, [(c.tube, c.sequence) for c in s.stops]) for s in model.hole.stations]
-    fused = [model.hole.direction_of(s) for s in model.hole.stations]
-    directions = [np.concatenate([f.lean, [f.down], f.cov.ravel(), f.total_cov.ravel()]) for f in fused]
-    points = [np.concatenate([[p.md], p.position, p.cov.ravel()]) for p in model.hole.trajectory]
-    assert model.hole.projection is not None
-    end = model.hole.projection
-    projection = [np.concatenate([end.ends.offset, end.ends.cov.ravel(), [end.within, end.half_width]])]
-    moved = sorted((m.md, m.at, m.dropped) for m in model.hole.moved)
-    return {
-        "stations": stations, "directions": directions, "points": points, "projection": projection, "moved": moved,
-    }  # fmt: skip
-
-
-def differing(one: dict[str, Any], other: dict[str, Any]) -> list[str]:
-    """What differs by more than the order in which shared errors were met, and so are summed, explains."""
-    return [name for name, value in one.items() if not same(value, other[name])]
-
-
-def same(one: Any, other: Any) -> bool:
-    if one and isinstance(one[0], np.ndarray):
-        return all(np.allclose(a, b, rtol=1e-10, atol=1e-18) for a, b in zip(one, other, strict=True))
-    return bool(one == other)
 
 
 @pytest.mark.slow
@@ -182,28 +34,6 @@ def test_surveys_may_come_in_any_order(tmp_path: Path, moves: bool, apart: float
     shuffled = measurements[:]
     shuffler.shuffle(shuffled)
     assert differing(result(knowing(tmp_path, shuffled, 4)), expected) == []
-
-
-def halves(moved_from: int) -> list[Placed]:
-    """Stops at half and at whole tubes: each reads every second station."""
-    return [
-        (survey(tube, stop, 4 - tube, 2.0 if stop >= moved_from else 1.0), 2.0 * (4 - tube) + 1.0 * (stop % 2))
-        for stop in range(1, 7)
-        for tube in (1, 2, 3)
-    ]
-
-
-def test_stations_between_others_do_not_hide_that_the_hole_moved(tmp_path: Path) -> None:
-    model = knowing(tmp_path, halves(moved_from=5), 3)
-    assert sorted(moved.md for moved in model.hole.moved) == [2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
-    assert [inclination_deg(model, n) for n in range(6)] == pytest.approx([2.0] * 6, abs=1e-6)
-
-
-def test_a_station_that_was_met_later_changes_no_earlier_decision(tmp_path: Path) -> None:
-    between = (survey(1, 9, 1, 1.0), 3.0)
-    in_order, early = (knowing(tmp_path, m, 4) for m in ([*moving(4, 4), between], [between, *moving(4, 4)]))
-    assert sorted(moved.md for moved in in_order.hole.moved) == [2.0, 4.0, 6.0]
-    assert differing(result(early), result(in_order)) == []
 
 
 def test_a_late_survey_clears_no_alarm_before_it_was_raised(tmp_path: Path) -> None:
@@ -248,7 +78,7 @@ def test_a_measurement_that_is_none_is_counted_and_changes_nothing(tmp_path: Pat
 def test_the_random_part_of_a_station_shrinks_and_its_joints_stay(tmp_path: Path) -> None:
     def stds(count: int) -> dict[str, Any]:
         measurements = [(survey(1, stop, 1, 5.0), 2.0) for stop in range(1, count + 1)]
-        view = shown_on(knowing(tmp_path, measurements, 1), "uncertainty")
+        view = shown_on(knowing(tmp_path, measurements, 1, weighting="bayes"), "uncertainty")
         return view["stations"][-1]["sources"]
 
     one, nine = stds(1), stds(9)
@@ -275,7 +105,8 @@ def test_uncertainty_is_told_at_a_confidence_with_its_sources(tmp_path: Path) ->
         for axis, name in enumerate(("sigma_north_m", "sigma_east_m", "sigma_tvd_m")):
             squares = sum(source[name] ** 2 for source in sources.values())
             assert squares == pytest.approx(point.cov[axis, axis], rel=1e-6, abs=1e-15)
-    assert set(view["stations"][-1]["sources"]) == {"random", "mounts", "joints", "accelerometer_bias", "depth", "path"}
+    told = {"random", "mounts", "joints", "accelerometer_bias", "depth", "path", "collar", "north"}
+    assert set(view["stations"][-1]["sources"]) == told
 
 
 def test_another_confidence_scales_the_regions(tmp_path: Path) -> None:
@@ -310,7 +141,7 @@ FIRST_LEG = 2.0 / DEG * (1.0 - math.cos(DEG))  # m aside, of an arc of 2 m from 
 def column_of(tmp_path: Path, inclination: float, azimuth: float, **settings: Any) -> tuple[RigModel, dict[str, Any]]:
     """Five stations of a hole that leans alike all along, each read by the tube at the bit."""
     measurements = [(survey(1, stop, 1, inclination, azimuth), 2.0 * stop) for stop in range(1, 6)]
-    model = knowing(tmp_path, measurements, 1, **settings)
+    model = knowing(tmp_path, measurements, 1, **FOLLOWED | settings)
     return model, shown_on(model, "column")
 
 
@@ -338,7 +169,7 @@ def test_a_column_is_told_in_centimetres_percent_and_degrees(tmp_path: Path) -> 
 
 
 def test_a_column_is_projected_to_its_target(tmp_path: Path) -> None:
-    _, view = column_of(tmp_path, 1.0, 120.0)
+    _, view = column_of(tmp_path, 1.0, 120.0, curvature_std_deg_per_m=0.3)
     toe, projection = view["stations"][-1], view["projection"]
     expected = toe["deviation_cm"] + 100.0 * (30.0 - toe["along_m"]) * math.tan(DEG)
     assert projection["deviation_cm"] == pytest.approx(expected, rel=1e-3)  # it has gone straight so far
@@ -408,18 +239,3 @@ def test_an_alarm_of_a_projection_is_cleared_when_the_hole_is_steered_back(tmp_p
     # not by the first survey that is straight again, which says little of the 24 m ahead: once 80 % lie within
     assert 3 * BETWEEN_STOPS + 0.5 < cleared[100] <= cleared[80] <= cleared[50]
     assert [row for row in view["active"] if row["kind"] == "projection"] == []
-
-
-def test_the_alarms_tell_of_stations_that_moved(tmp_path: Path) -> None:
-    model = knowing(tmp_path, moving(4, 4), 4)
-    check_answers(model)
-    view = shown_on(model, "alarms")["moved"]
-    assert len(view) == len(model.hole.moved) > 0
-    for row, moved in zip(view, model.hole.moved, strict=True):
-        assert row == {
-            "md_m": moved.md,
-            "at_s": moved.at,
-            "dropped_measurements": moved.dropped,
-            "departure_sigma": moved.evidence.own,
-            "neighbours_sigma": list(moved.evidence.neighbours),
-        }

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from forked_commands import run
-from hand_fed import Rig
+from hand_fed import FOLLOWED, Rig
 from schemas import shown_on
-from test_model import knowing, survey
+from string_passes import knowing, survey
 
 from groundstation.config import GroundConfig, checked_config
 from groundstation.errors import ConfigurationError, SurveyError
@@ -118,7 +118,7 @@ def test_a_hole_drilled_on_its_plan_does_not_deviate_and_one_beside_it_does(tmp_
             (survey(1, md, 1, max(md - 4.0, 0.0) * 2.0 + inclination_more, 30.0), float(md)) for md in range(1, 13)
         ]
         folder = tmp_path / f"{inclination_more}"
-        return shown_on(knowing(folder, placed, 1, plan=plan, collar_inclination_deg=0.0), "column")
+        return shown_on(knowing(folder, placed, 1, plan=plan, **FOLLOWED), "column")
 
     on, beside = column(0.0), column(1.0)
     for row in on["stations"]:
@@ -137,7 +137,9 @@ def config_end(plan: PlanSettings) -> list[float]:
 
 def test_a_rig_tells_the_plan_and_its_verdict(tmp_path: Path) -> None:
     rig = Rig(
-        tmp_path, plan=PlanSettings(leg=(LegSettings(length_m=2.0), LegSettings(length_m=8.0, to_inclination_deg=12.0)))
+        tmp_path,
+        **FOLLOWED,
+        plan=PlanSettings(leg=(LegSettings(length_m=2.0), LegSettings(length_m=8.0, to_inclination_deg=12.0))),
     )
     rig.run(5.0)
     rig.drill(1, 0.0)

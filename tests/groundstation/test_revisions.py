@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from schemas import shown_on
-from test_model import Placed, passes
+from string_passes import Placed, passes
 
 from groundstation.config import GroundConfig
 from groundstation.service.answers.model import RigModel

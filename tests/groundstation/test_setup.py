@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hand_fed import TOLD, Rig
+from hand_fed import FOLLOWED, TOLD, Rig
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tapes import write
@@ -71,7 +71,7 @@ def started_again(rig: Rig) -> Rig:
 def test_without_north_the_answer_is_dont_know_with_its_name(tmp_path: Path) -> None:
     rig = drilled(tmp_path, north_std_deg=None)
     verdict = rig.ask("verdict")
-    assert (verdict["verdict"], verdict["doubts"]) == ("dont_know", ["setup"])
+    assert (verdict["verdict"], verdict["doubts"]) == ("dont_know", ["setup", "uncertain"])
     assert verdict["line"] == "DON'T KNOW: not told: north"
     setup = rig.ask("setup")
     assert (setup["ready"], setup["missing"]) == (False, ["north"])
@@ -110,7 +110,7 @@ def test_told_before_or_after_the_surveys_is_the_same_and_so_is_a_start_upon_the
 
 def test_a_node_that_was_not_told_its_joint_is_named_and_its_azimuth_is_right_once_it_is(tmp_path: Path) -> None:
     """The hole leans to 240 deg: the joint has 70 deg that the yaws of tube 1 lack."""
-    rig = Rig(tmp_path, target=20.0)
+    rig = Rig(tmp_path, target=20.0, **FOLLOWED)
     rig.untold = {2: NodeFlag.LOWER_UNTOLD}
     rig.run(5.0)
     rig.drill(1, 2.0)
@@ -147,7 +147,7 @@ def test_a_tube_that_hung_from_the_head_by_a_joint_that_was_not_told_is_missed_t
 
 
 def test_a_joint_that_its_node_was_told_is_corrected_by_what_it_was_told(tmp_path: Path) -> None:
-    rig = drilled(tmp_path)
+    rig = drilled(tmp_path, **FOLLOWED)
     with pytest.raises(SelectorError, match=r"joint 2-1: the node of tube 2 was told its angle.*; expected used_deg"):
         order(rig, "joint", tube=1, angle_deg=12.0, sigma_deg=0.1)
     order(rig, "joint", tube=1, angle_deg=12.0, sigma_deg=0.1, used_deg=10.0)
@@ -156,7 +156,7 @@ def test_a_joint_that_its_node_was_told_is_corrected_by_what_it_was_told(tmp_pat
 
 
 def test_a_joint_told_twice_is_told_back_and_both_are_kept(tmp_path: Path) -> None:
-    rig = drilled(tmp_path)
+    rig = drilled(tmp_path, **FOLLOWED)
     order(rig, "joint", tube=1, angle_deg=12.0, sigma_deg=0.1, used_deg=10.0)
     detail = order(rig, "joint", tube=1, angle_deg=13.0, sigma_deg=0.2, used_deg=10.0)
     assert "joint.2-1 is 13 ± 0.2 deg" in detail

@@ -65,7 +65,7 @@ def _doubts_of_surveys(
     deepest, bit = stations[-1], string.bit
     if bit is not None and bit - deepest.md > behind:
         yield VerdictDoubt.STALE, f"the bit is at {bit:.1f} m, the deepest survey at {deepest.md:.1f} m"
-    for md in hole.trajectory.turned_back:
+    for md in hole.turned_back:
         yield VerdictDoubt.YAW, f"the survey at {md:.1f} m points back up the hole"
     if not deepest.is_trusted:
         yield VerdictDoubt.YAW, f"the yaw of the survey at {deepest.md:.1f} m is untrusted"

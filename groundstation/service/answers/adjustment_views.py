@@ -32,7 +32,7 @@ def answer_adjustment(k: RigModel, _p: Parameters) -> AdjustmentAnswer:
     """The adjustment as it stands; empty before the first survey below the collar."""
     examined = k.hole.examined
     if examined is None:
-        return AdjustmentAnswer(0, 0.0, None, None, None, [], [], [], None)
+        return AdjustmentAnswer(0, 0.0, None, None, None, 0, [], [], [], None)
     found = examined.adjusted
     return AdjustmentAnswer(
         surveys=len(found.looks),
@@ -41,6 +41,7 @@ def answer_adjustment(k: RigModel, _p: Parameters) -> AdjustmentAnswer:
         play_deg=math.degrees(math.sqrt(found.now.play_var)),
         sigma_toe_cm=100.0
         * math.hypot(std_across(np.sum([share.variances for share in examined.shares], axis=0)), north_at_toe(k)),
+        searched=examined.surveys,
         blunders=[blunder_row(examined, one) for one in examined.examination.blunders],
         toe=toe_shares(k, examined),
         tubes=[adjusted_tube(examined, place) for place in range(len(examined.tubes))],

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from groundstation.service.hole.surveyed_hole import SurveyedHole
+from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import direction_angles
 
 CONTRADICTS = 4.0  # sigmas
@@ -20,7 +21,7 @@ def collar_doubt(hole: SurveyedHole, curvature_std: float) -> str:
     station = next((one for one in hole.stations if one.md > 0.0), None)
     if station is None:
         return ""
-    first, collar = hole.direction_of(station), hole.collar
+    first, collar = station.fused(Weighting.BAYES), hole.collar  # an adjusted hole is adjusted to the collar too
     bend = (curvature_std * station.md) ** 2
     apart = first.lean - collar.lean
     cov = first.total_cov + collar.total_cov + bend * np.eye(2)

@@ -11,19 +11,25 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunder_words import say_blunder
 from groundstation.survey.adjustment.blunders import Blunder, Examination, chance_of_one
-from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, toe_budget
+from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, prior_shares, toe_budget
 from groundstation.survey.adjustment.hypotheses import BlunderKind, Hypothesis
 from groundstation.survey.adjustment.next_stop import NextStop, plan_stop
 from groundstation.survey.adjustment.reliability import Reliability, measure_reliability
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
-from groundstation.survey.adjustment.toe_weights import toe_weights
+from groundstation.survey.adjustment.toe_weights import position_weights, toe_weights
+from groundstation.survey.fusion.shared import KINDS
 
 Array = npt.NDArray[np.float64]
 LEVEL = 2  # of north, east and down those across a hole
 OF_TUBE = (ShareSource.BIAS, ShareSource.TILT)
 LARGEST_STEP = 0.2  # m/s^2, by which an accelerometer that was knocked may step: 20 mg
+SOURCE_NAMES = {
+    ShareSource.BIAS: "accelerometer_bias", ShareSource.TILT: "mounts", ShareSource.COLLAR: "collar",
+    ShareSource.PATH: "path",
+}  # fmt: skip
 STEP = BlunderKind.BIAS_STEPPED
 UNEVEN = (BlunderKind.ENCODER_DRIFTS,)  # whose size is one for all stops, and not quite so
+UNEXPLAINED = "the newest surveys contradict those before; what is wrong is being looked for"
 UNSOLVED = (
     "the surveys cannot be adjusted to each other, so every station stands for itself and nothing is found that is "
     "wrong: check what was told of the rig, and the newest surveys"
@@ -39,11 +45,15 @@ class ExaminedHole:
     examination : with what was found to be wrong
     run : how the string was run
     tubes : numbers of the tubes by their places
+    surveys : how many there were when it was looked for what is wrong
+    is_open : whether more seems to be wrong than was looked for yet
     """
 
     examination: Examination
     run: RunOfStops
     tubes: tuple[str, ...]
+    surveys: int
+    is_open: bool = False
 
     @property
     def adjusted(self) -> Adjusted:
@@ -58,7 +68,8 @@ class ExaminedHole:
     def doubts(self) -> list[str]:
         """Sentences of what may be one thing or another, or goes on by no two stops alike, as a belt that slips."""
         blunders = self.examination.blunders
-        return [self.sentence(one) for one in blunders if one.is_doubt or one.best.hypothesis.kind in UNEVEN]
+        found = [self.sentence(one) for one in blunders if one.is_doubt or one.best.hypothesis.kind in UNEVEN]
+        return [*found, UNEXPLAINED] if self.is_open else found
 
     def subject(self, one: Hypothesis) -> str:
         """What a blunder is of: a tube, the hole, the collar, the depth or the encoder."""
@@ -90,6 +101,18 @@ class ExaminedHole:
             return kind, f"tube {self.tubes[place]}" if place >= 0 else ""
         is_of_tube = share.source in OF_TUBE and share.subject >= 0
         return share.source.value, f"tube {self.tubes[share.subject]}" if is_of_tube else ""
+
+    @cached_property
+    def position_variances(self) -> dict[str, Array]:
+        """Variances (s + 1, 3), m^2, of collar and stations to north, east and down by what looks have in common."""
+        found: dict[str, Array] = {}
+        for share in prior_shares(self.adjusted, position_weights(self.adjusted), self.run.causes):
+            name = SOURCE_NAMES.get(share.source)
+            if share.source is ShareSource.TURN:
+                name = KINDS.get(self.share_name(share)[0], "joints")
+            if name is not None:
+                found[name] = found.get(name, 0.0) + share.variances.reshape(-1, 3)
+        return found
 
     @cached_property
     def next_stop(self) -> NextStop | None:

@@ -25,8 +25,8 @@ UPPER = (0, 1, 3)  # of the entries of a covariance those that are not said twic
 KEPT = 512  # moments; of more every second of the older half goes
 ROOM = 8  # part of its length that a table of stations has left for those below
 SAME_STOP = 15.0  # s, within which two surveys were taken at one stop
-LOOKED_AT_ALL = 20_000  # surveys, summed over the stops that are worked out anew, up to which it is every stop
-SPARSER = 1.25  # times the surveys of the one before, that the next such stop has from there on
+LOOKED_AT_ALL = 5_000  # surveys, summed over the stops that are worked out anew, up to which it is every stop
+SPARSER = 1.5  # times the surveys of the one before, that the next such stop has from there on
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,19 +8,19 @@ therefore begins where one of all looks up to an earlier stop of the string ends
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.config import GroundConfig
+from groundstation.service.hole.blunder_search import BlunderSearch, LookedAt
 from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import SAME_STOP
 from groundstation.service.hole.resolved_stops import ResolvedStops, Rows
 from groundstation.service.hole.string_prior import Hanging, causes_of_turns, prior_of_string
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.blunders import Examination, examine_hole
 from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.fusion.resolve import Direction
@@ -34,17 +34,8 @@ Places = npt.NDArray[np.intp]
 MANY = 1500  # looks, from which on an adjustment begins where an earlier one ended
 STOPS_KEPT = 16  # stops of the string between such beginnings
 OWN_SHARE = 0.2  # of a tube's noise that is taken from the stop itself: the variance of 32 readings is not exact
+FURTHER = 2 + 30  # columns of gravity, of north, and of what is wrong: two explanations of five blunders
 LOUD = 2.5  # times a tube's noise, from which on a stop is one at which it was shaken
-
-
-@dataclass(frozen=True, slots=True)
-class LookedAt:
-    """Looks in the order of time, what is known of their tubes before, and how the string was run."""
-
-    looks: Looks
-    string: StringPrior
-    run: RunOfStops
-    tubes: tuple[str, ...]  # numbers of the tubes by their places
 
 
 class HoleAdjustment:
@@ -58,10 +49,29 @@ class HoleAdjustment:
 
     def __init__(self, config: GroundConfig, shared: SharedErrors) -> None:
         self._config, self._shared = config, shared
+        self._search: BlunderSearch | None = None
         self._kept: tuple[bytes, StartingPoint] | None = None  # where an earlier adjustment ended, and of what looks
+        self._hanging, self._met = Hanging(), set[int]()  # chains of which there was a stop
+
+    def search_apart(self) -> None:
+        """From now on look for what is wrong on a thread of its own."""
+        self._search = BlunderSearch()
+
+    def take_found(self) -> tuple[int, ExaminedHole] | None:
+        """What a search of its own came to since the last call, with the number of its newest survey."""
+        return None if self._search is None else self._search.take_found()
+
+    def make_room(self, chain: int) -> None:
+        """Have the columns that a chain may need, in the order in which stops come and not in that of questions."""
+        if chain in self._met:
+            return
+        self._met.add(chain)
+        self._hanging.add_chain(self._shared.chain(chain))
+        tubes, make_ups = len(self._hanging.tubes), len(self._hanging.make_ups)
+        self._shared.adjusted_places(OF_TUBE * tubes + make_ups + FURTHER)
 
     def examine(
-        self, stops: ResolvedStops, station_of_row: Places, mds: Array, collar: Direction
+        self, stops: ResolvedStops, station_of_row: Places, mds: Array, collar: Direction, number: int
     ) -> ExaminedHole | None:
         """Adjust the hole and say what is wrong with it; None where no look counts.
 
@@ -71,6 +81,7 @@ class HoleAdjustment:
         station_of_row : (n,), place of the station of each in the order of depth, from 1; 0 at the collar
         mds : (s,) m, of the stations below the collar
         collar : direction there, as it is known before
+        number : of the newest survey
         """
         table = stops.rows[: len(stops)]
         below = np.flatnonzero(station_of_row > 0)
@@ -79,12 +90,12 @@ class HoleAdjustment:
             return None
         path = self.path_of(mds, collar)
         forces = stops.mean_forces(rows)
-        seen = self._looked_at(table[rows], forces, station_of_row[rows], path.md)
-        start = self._start(table[rows], seen, path)
-        return ExaminedHole(examine_hole(seen.looks, seen.string, path, seen.run, start=start), seen.run, seen.tubes)
+        seen = self._looked_at(table[rows], forces, station_of_row[rows], path)
+        seen = replace(seen, start=self._start(table[rows], seen))
+        return seen.examine() if self._search is None else self._search.examine(number, seen)
 
-    def _looked_at(self, seen: Rows, forces: Array, station: Places, station_md: Array) -> LookedAt:
-        """Looks of rows of the table in the order of time, with their mean forces, at their stations (m)."""
+    def _looked_at(self, seen: Rows, forces: Array, station: Places, path: PathPrior) -> LookedAt:
+        """Looks of rows of the table in the order of time, with their mean forces, at their stations along a path."""
         numbers, which = number_values(seen["chain"])
         chains, hanging = [self._shared.chain(number) for number in numbers], Hanging()
         hung = np.array([hanging.add_chain(chain) for chain in chains], np.intp)[which]
@@ -98,10 +109,10 @@ class HoleAdjustment:
         noise, yaw = noise_of(seen, tube_of), seen["yaw"].copy()
         looks = Looks(station, tube_of, make_up, stop, force, noise, yaw, seen["yaw_var"] + unknown)
         first = np.searchsorted(stop, np.arange(stop[-1] + 1))
-        deepest = np.maximum.reduceat(station_md[station], first)
-        run = RunOfStops(deepest, seen["at"][first], station_md, causes)
+        deepest = np.maximum.reduceat(path.md[station], first)
+        run = RunOfStops(deepest, seen["at"][first], path.md, causes)
         string = prior_of_string(self._config, len(hanging.tubes), causes)
-        return LookedAt(looks, string, run, tuple(str(tube) for _, tube in hanging.tubes))
+        return LookedAt(looks, string, path, run, tuple(str(tube) for _, tube in hanging.tubes))
 
     def path_of(self, mds: Array, collar: Direction) -> PathPrior:
         """What is known of the path before."""
@@ -115,9 +126,9 @@ class HoleAdjustment:
             self._config.curvature_length,
         )
 
-    def _start(self, rows: Rows, seen: LookedAt, path: PathPrior) -> StartingPoint | None:
+    def _start(self, rows: Rows, seen: LookedAt) -> StartingPoint | None:
         """Where the adjustment of many looks begins; None for that of a few, which begins with the looks alone."""
-        looks = seen.looks
+        looks, path = seen.looks, seen.path
         if len(looks) < MANY:
             return None
         earlier = np.flatnonzero(looks.stop < int(looks.stop[-1]) // STOPS_KEPT * STOPS_KEPT)
@@ -127,7 +138,7 @@ class HoleAdjustment:
         above = replace(path, md=path.md[np.concatenate([[0], used])])
         made_of = rows[earlier].tobytes() + looks.force[earlier].tobytes() + above.md.tobytes()
         if self._kept is None or self._kept[0] != made_of:
-            part = self._looked_at(rows[earlier], looks.force[earlier], station.astype(np.intp) + 1, above.md)
+            part = self._looked_at(rows[earlier], looks.force[earlier], station.astype(np.intp) + 1, above)
             self._kept = made_of, adjust_hole(part.looks, part.string, above).now
         return grown_start(self._kept[1], used, len(path.md), seen.string)
 
@@ -149,7 +160,13 @@ def grown_start(start: StartingPoint, used: Places, count: int, string: StringPr
     legs = np.full(count - 1, start.curvature_var)
     legs[known[1:] - 1] = start.leg_vars
     return replace(
-        start, tangents=start.tangents[nearest], curvatures=curvatures, tubes=tubes, make_ups=make_ups, leg_vars=legs
+        start,
+        tangents=start.tangents[nearest],
+        curvatures=curvatures,
+        tubes=tubes,
+        make_ups=make_ups,
+        leg_vars=legs,
+        is_learnt=True,
     )
 
 
@@ -173,24 +190,15 @@ def noise_of(seen: Rows, tube_of: Places) -> Array:
     return np.where(own > LOUD * usual, own, OWN_SHARE * own + (1.0 - OWN_SHARE) * usual)
 
 
-def collar_of(examination: Examination, told: Direction) -> Direction:
-    """Direction at the collar: as it was told, or as the stations have it where that is doubted."""
-    if not examination.doubts_collar:
-        return told
-    found = examination.adjusted
-    tangent, level = found.now.tangents[0], found.bases[0, :, :2]
-    return replace(told, lean=tangent[:2], down=float(tangent[2]), cov=level.T @ found.covs[0, :2, :2] @ level)
-
-
 def directions_of(adjusted: Adjusted, shared: SharedErrors, north_std: float) -> list[SphereDirection]:
-    """Directions of the stations below the collar, from the top down.
+    """Directions of the collar and the stations below it, from the top down.
 
     The encoder's zero against north (rad) turns them all about the vertical and is in no look: it is one more column.
     """
-    bases, tangents = adjusted.bases[1:], adjusted.now.tangents[1:]
-    own = np.swapaxes(bases, 1, 2) @ adjusted.own_covs[1:, :2, :2] @ bases
+    bases, tangents = adjusted.bases, adjusted.now.tangents
+    own = np.swapaxes(bases, 1, 2) @ adjusted.own_covs[:, :2, :2] @ bases
     turned = north_std * np.stack([-tangents[:, 1], tangents[:, 0], np.zeros(len(tangents))], axis=1)
-    columns = np.concatenate([np.swapaxes(bases, 1, 2) @ adjusted.columns[1:, :2], turned[:, :, None]], axis=2)
+    columns = np.concatenate([np.swapaxes(bases, 1, 2) @ adjusted.columns[:, :2], turned[:, :, None]], axis=2)
     places = shared.adjusted_places(columns.shape[2])
     width = shared.count
     found = []

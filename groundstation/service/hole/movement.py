@@ -1,18 +1,26 @@
-"""Where a hole moved between two stops of the string: what was found there before counts no more. No I/O."""
+"""Where a hole moved between two stops of the string. No I/O.
+
+Where stations are fused one by one, what was found there before counts no more. Where the hole is adjusted in one it
+is a blunder of the looks before, by whose size they are put right.
+"""
 
 from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
 
+from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import SAME_STOP
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
+from groundstation.survey.adjustment.blunders import Blunder
+from groundstation.survey.adjustment.hypotheses import BlunderKind
 from groundstation.survey.fusion.fusion import DEPARTED, Evidence, departures_from, judge_departure
 
 
@@ -139,3 +147,31 @@ class Movement:
                 one.station.stops.keep_departure(one.place, departure)
         for one in alone:
             one.station.departure(one.place)
+
+
+def moved_stations(examined: ExaminedHole, below: list[SurveyStation]) -> list[Moved]:
+    """Where an adjusted hole moved; the stations are told from which stop on they are where they are now.
+
+    Parameters
+    ----------
+    below : stations below the collar in the order of depth
+    """
+    found: list[Moved] = []
+    for station in below:
+        station.drops = []
+    for blunder in examined.examination.blunders:
+        if blunder.best.hypothesis.kind is BlunderKind.HOLE_MOVED and not blunder.is_doubt:
+            found += _moved_by(blunder, examined, below)
+    return found
+
+
+def _moved_by(blunder: Blunder, examined: ExaminedHole, below: list[SurveyStation]) -> Iterator[Moved]:
+    best = blunder.best
+    (first, last), since = best.hypothesis.subject, float(examined.run.time[best.hypothesis.stop])
+    evidence = Evidence(math.sqrt(float(best.size @ np.linalg.solve(best.cov, best.size))), (), agree=True)
+    for station in below[first - 1 : last]:
+        at = station.stops.column("at")
+        place = int(np.searchsorted(at, since))
+        if 0 < place < len(at) and place not in station.drops:
+            yield Moved(station.md, float(at[place]), place - station.first_before(place), evidence)
+            station.drops = sorted([*station.drops, place])

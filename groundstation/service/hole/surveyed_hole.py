@@ -20,8 +20,8 @@ from groundstation.config import GroundConfig
 from groundstation.service.hole.deviation_alarms import AlarmList
 from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import History, Moment
-from groundstation.service.hole.hole_adjustment import HoleAdjustment, collar_of, directions_of
-from groundstation.service.hole.movement import Moved, Movement
+from groundstation.service.hole.hole_adjustment import HoleAdjustment, directions_of
+from groundstation.service.hole.movement import Moved, Movement, moved_stations
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
 from groundstation.service.hole.told_depths import depths_at_make_ups, told_depth_errors
@@ -31,6 +31,7 @@ from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
 from groundstation.survey.fusion.survey_trust import Trust
+from groundstation.survey.fusion.tangents import tangents_of
 from groundstation.survey.fusion.transport import Carried, carry_directions
 from groundstation.survey.path.curvature_tendency import CurvatureTendency, learn_curvature
 from groundstation.survey.path.leg_wander import LegWander
@@ -38,7 +39,7 @@ from groundstation.survey.wall.column_deviation import Deviations, axis_deviatio
 from groundstation.survey.wall.projected_end import ProjectedEnd, project_to_target
 from groundstation.survey.well.depth_errors import DepthErrors, mean_depth
 from groundstation.survey.well.make_up_depths import learnt_reading_std, misfit_of_depths
-from groundstation.survey.well.trajectory import Trajectory
+from groundstation.survey.well.trajectory import TURNED_BACK, Trajectory
 
 Array = npt.NDArray[np.float64]
 
@@ -57,6 +58,7 @@ class SurveyedHole:
         self._config = config
         self._shared = shared
         self._setup = setup
+        self._searches_apart = False
         self._is_adjusted = config.weighting is Weighting.ADJUSTED
         self._design = config.design
         self.version = 0  # grows with every survey
@@ -81,19 +83,28 @@ class SurveyedHole:
         self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
         self._stations: list[SurveyStation] = []
         self._movement = Movement(self._stops, self._station_of)
+        self._moved: list[Moved] = []  # of the adjusted hole
+        self._surveyed_back: list[float] = []  # m, in it
         self._adjustment = HoleAdjustment(self._config, self._shared)
+        if self._searches_apart:
+            self._adjustment.search_apart()
         self._examined: tuple[int, ExaminedHole | None] = (0, None)  # of the version that it is of
         self._is_unsolved = False
         self._adjusted: dict[float, Direction] = {}  # by the depth (m) of a station, where the hole is adjusted
         self._alarms = AlarmList()
         self._history = History(kept)
+        self._adjusted_collar: Direction = self._collar
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
-        self._draw_from(self._collar)
+        self._trajectory = self._drawn_from(self._collar)
         self._deviations = self._deviate()
         self._projection: ProjectedEnd | None = None
         self._is_foreseen = True  # whether the projection is that of the trajectory
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
         self._newest_at = -math.inf  # s, rig time of the newest survey
+
+    def _drawn_from(self, collar: Direction) -> Trajectory:
+        """A trajectory that begins with a direction."""
+        return Trajectory(collar=collar, wander=self._config.wander, keeps_columns=False)
 
     def add_stop(self, stops: ResolvedStops, row: int, epoch: int) -> bool:
         """Take a stop with rig time of an epoch; a revision of one that is known takes its place, unless it is older.
@@ -103,6 +114,8 @@ class SurveyedHole:
         at, md = stops.rows["at"].item(row), stops.rows["md"].item(row)
         if self._history.begins_stop(epoch, at):
             self._end_stop()
+        if self._is_adjusted:
+            self._adjustment.make_room(stops.rows["chain"].item(row))
         stops.rows["number"][row] = self.newest + 1
         station = self._station_at(md)
         revised = station.stops.revised_by(stops, row)
@@ -117,6 +130,23 @@ class SurveyedHole:
         self._touched[station.md] = station
         self._unsettled_since = min(self._unsettled_since, at)
         self._newest_at = max(self._newest_at, at)
+        return True
+
+    def search_apart(self) -> None:
+        """From now on look for what is wrong on a thread of its own, so that no question waits for it."""
+        self._searches_apart = True
+        self._adjustment.search_apart()
+
+    def adopt_found(self) -> bool:
+        """Take over what a search of its own has found since the last time; whether it has."""
+        ended = self._adjustment.take_found()
+        if ended is None:
+            return False
+        number, found = ended
+        self.version += 1
+        if number == self.newest:
+            self._examined = self.version, found
+        self._unsettled_since = min(self._unsettled_since, self._newest_at)
         return True
 
     def catch_up(self) -> None:
@@ -162,7 +192,7 @@ class SurveyedHole:
     def moved(self) -> list[Moved]:
         """Where the hole moved."""
         self.settle()
-        return self._movement.moved
+        return self._moved if self._is_adjusted else self._movement.moved
 
     @property
     def alarms(self) -> AlarmList:
@@ -183,13 +213,17 @@ class SurveyedHole:
 
     @property
     def collar(self) -> Direction:
-        """Direction at the collar as well as it is known."""
+        """Direction at the collar as it was told."""
         return self._collar
 
     @property
     def turned_back(self) -> list[float]:
-        """Depths (m) of stations that point back against the one above, in the trajectory as it was drawn last."""
-        return self._trajectory.turned_back
+        """Depths (m) of stations whose surveys point back against those of the one above.
+
+        The adjustment of the hole leaves such a survey out, and what is drawn points on.
+        """
+        self.settle()
+        return self._surveyed_back if self._is_adjusted else self._trajectory.turned_back
 
     def direction_of(self, station: SurveyStation) -> Direction:
         """Direction of the hole at a station, the transport of the string in it."""
@@ -214,7 +248,7 @@ class SurveyedHole:
             station_of_row = np.array([place.get(id(one), 0) for one in self._station_of], np.intp)
             mds = np.array([one.md for one in below])
             try:
-                found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar)
+                found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar, self.newest)
                 self._is_unsolved = False
             except (np.linalg.LinAlgError, ArithmeticError):
                 found, self._is_unsolved = None, True
@@ -235,7 +269,7 @@ class SurveyedHole:
         """Direction of a station without transport; that of the collar is the collar's where the hole is adjusted."""
         if not self._is_adjusted:
             return station.fused(self._config.weighting)
-        return self._adjusted.get(station.md, self._collar)
+        return self._adjusted.get(station.md, self._adjusted_collar)
 
     @property
     def has_transport(self) -> bool:
@@ -255,12 +289,21 @@ class SurveyedHole:
         They are worked out when they are asked for: a start goes through hundreds of stops and shows none of them.
         """
         drawn = self.trajectory
-        shared = np.concatenate([self._shared.variances(columns) for columns in drawn.columns()])
-        found = dict(zip(KIND_NAMES, np.moveaxis(shared, 1, 0), strict=True))
-        found["depth"] = found["depth"] + np.diagonal(drawn.depth_covs, axis1=1, axis2=2)
-        found["path"] = np.diagonal(drawn.path_covs, axis1=1, axis2=2)
+        found = self._variances_of_directions(drawn)
+        for name, covs in (("depth", drawn.depth_covs), ("path", drawn.path_covs)):
+            found[name] = found.get(name, 0.0) + np.diagonal(covs, axis1=1, axis2=2)
         rest = np.diagonal(drawn.covs, axis1=1, axis2=2) - sum(found.values())
         return {"random": np.maximum(rest, 0.0)} | found
+
+    def _variances_of_directions(self, drawn: Trajectory) -> dict[str, Array]:
+        """Variances (n, 3), m^2, along a trajectory by what directions have in common."""
+        shared = np.concatenate([self._shared.variances(columns) for columns in drawn.columns()])
+        found = dict(zip(KIND_NAMES, np.moveaxis(shared, 1, 0), strict=True))
+        if not self._is_adjusted or self.examined is None:
+            return found
+        turned = np.square(drawn.positions[:, 1::-1]) * north_std(self._setup) ** 2
+        north = np.concatenate([turned, np.zeros((len(turned), 1))], axis=1)
+        return {"depth": found["depth"], "north": north} | self.examined.position_variances
 
     def place_of(self, station: SurveyStation) -> int:
         """Place of a station in the trajectory; that of the collar for one at its depth."""
@@ -284,29 +327,35 @@ class SurveyedHole:
         if since < math.inf:
             self._work_out(self._adjust() if self._is_adjusted else self._fuse(since))
 
-    def _draw_from(self, collar: Direction) -> None:
-        """Begin the trajectory anew with a direction at the collar."""
-        self._trajectory_from = collar
-        self._trajectory = Trajectory(collar=collar, wander=self._config.wander, keeps_columns=False)
-
     def _adjust(self) -> list[SurveyStation]:
-        """Adjust the hole; all of its stations have changed."""
-        self._touched, examined = {}, self.examined
+        """Adjust the hole; all of its stations have changed, and so has the direction from which it is drawn."""
+        self._touched, examined, below = {}, self.examined, self._below
         if examined is None:
-            self._adjusted = {one.md: one.fused(Weighting.BAYES) for one in self._below}
-            return self._below
-        collar = collar_of(examined.examination, self._collar)
-        if collar is not self._trajectory_from:
-            self._draw_from(collar)
-        found = directions_of(examined.adjusted, self._shared, north_std(self._setup))
-        self._adjusted = dict(zip([one.md for one in self._below], found, strict=True))
-        if examined is not None:
-            now = examined.adjusted.now
-            wander = LegWander(math.sqrt(now.curvature_var), self._config.curvature_length)
-            driven = now.leg_vars / now.curvature_var
-            driven[:-1] = np.maximum(driven[:-1], driven[1:])  # what bends sharply may have begun above the station
-            self._trajectory.bend_as(wander, driven)
-        return self._below
+            self._stand_alone(below)
+            return below
+        at_collar, *found = directions_of(examined.adjusted, self._shared, north_std(self._setup))
+        self._adjusted = dict(zip([one.md for one in below], found, strict=True))
+        self._adjusted_collar = at_collar
+        self._trajectory = self._drawn_from(at_collar)
+        now = examined.adjusted.now
+        driven = now.leg_vars / now.curvature_var
+        driven[:-1] = np.maximum(driven[:-1], driven[1:])  # what bends sharply may have begun above the station
+        self._trajectory.bend_as(LegWander(math.sqrt(now.curvature_var), self._config.curvature_length), driven)
+        self._moved = moved_stations(examined, below)
+        self._surveyed_back = self._points_back(below)
+        return below
+
+    def _stand_alone(self, below: Sequence[SurveyStation]) -> None:
+        """Take every station for what its own surveys say, where they have no solution in common."""
+        self._adjusted = {one.md: one.fused(Weighting.BAYES) for one in below}
+        self._adjusted_collar, self._trajectory = self._collar, self._drawn_from(self._collar)
+        self._moved, self._surveyed_back = [], self._points_back(below)
+
+    def _points_back(self, below: Sequence[SurveyStation]) -> list[float]:
+        """Depths (m) of stations that by themselves point back against the one above."""
+        tangents = tangents_of([self._collar, *(one.fused(Weighting.BAYES) for one in below)])
+        back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
+        return [below[place].md for place in back.tolist()]
 
     def _fuse(self, since: float) -> list[SurveyStation]:
         """Fuse the stations of which something may have changed since a time (s), together those with one more stop."""
@@ -375,7 +424,7 @@ class SurveyedHole:
             return []
         mds, directions = zip(*measured, strict=True)
         places = self._shared.transport_places(len(measured) + 1)
-        self._carried = dict(zip(mds, carry_directions(self._collar, directions, places), strict=True))
+        self._carried = dict(zip(mds, carry_directions(self._adjusted_collar, directions, places), strict=True))
         return [(md, carried.direction) for md, carried in self._carried.items()]
 
     def _deviate(self) -> Deviations:

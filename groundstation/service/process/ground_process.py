@@ -85,6 +85,8 @@ class GroundProcess(Process):
     config : validated settings
     lot : number below its argument by lot; a simulated rig draws from its seed
     disk : that holds the database
+    searches_apart : what is wrong with the hole is looked for on a thread of its own: by a clock of its own no question
+        is to wait for it; where it is stepped, what is answered is the same at the same step every time
 
     Raises
     ------
@@ -95,7 +97,12 @@ class GroundProcess(Process):
     """
 
     def __init__(
-        self, config: GroundConfig, lot: Callable[[int], int] = secrets.randbelow, disk: Disk = MACHINE
+        self,
+        config: GroundConfig,
+        lot: Callable[[int], int] = secrets.randbelow,
+        disk: Disk = MACHINE,
+        *,
+        searches_apart: bool = False,
     ) -> None:
         self.config = config
         seals = None
@@ -108,6 +115,8 @@ class GroundProcess(Process):
         # by lot, not counted: a database that was deleted or restored must not repeat a number that the string has seen
         start = 1 + lot(STARTS)
         self.model = model = RigModel.begin(config)
+        if searches_apart:
+            model.hole.search_apart()
         self._string = model.string
         self.watch = Watch(model.string, model.hole, model.placement, model.rig_alarms, config.stale_after)
         self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=start, seals=seals)

@@ -117,10 +117,12 @@ class Learner:
         Measurements come one by one, tube by tube: to be asked at every look, and not for each of them.
         """
         hole = self._hole
+        is_explained = hole.adopt_found()
         before, self._known = self._known, (list(hole.alarms.alarms), len(hole.moved), hole.history.count)
         self._moments.keep()
         paths = {"alarms": before[:2] != self._known[:2], "history": before[2] != self._known[2]}
-        return [path for path, has_changed in paths.items() if has_changed]
+        changed = [path for path, has_changed in paths.items() if has_changed]
+        return sorted({*changed, *self._by_survey, "alarms"}) if is_explained else changed
 
     def restore(self) -> None:
         """Go on with everything that was stored, some hundred messages at a time."""

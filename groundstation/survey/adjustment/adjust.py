@@ -32,10 +32,11 @@ from groundstation.survey.adjustment.starting_point import first_start
 
 Array = npt.NDArray[np.float64]
 ITERATIONS = 12
-SETTLED = 1e-2  # standard deviations, of the last step; what is left then is a thirtieth of it
+SETTLED = 0.03  # standard deviations, of the last step; what is left then is some tenth of it
 NEAR = 3.0  # standard deviations, of a step from which on the play is not that of unknowns still on their way
 PLAY_SETTLED = 0.02  # of its variance
-LEGS_SETTLED = 0.1  # of the variance of each leg
+LEGS_SETTLED = 0.2  # of the logarithm of the variance of each leg
+PART = 0.75
 GROSS = 16.27  # chi-square of three beyond which a look counts less: one in a thousand
 
 
@@ -64,9 +65,9 @@ def adjust_hole(
     now = start or first_start(looks, string, path)
     if len(now.extra) != len(extra.std):
         now = replace(now, extra=np.zeros(len(extra.std)))
-    known = string_information(string, extra)
-    tried: list[tuple[float, float]] = []
-    for _ in range(ITERATIONS):
+    known, is_learnt = string_information(string, extra), now.is_learnt
+    is_bent, tried = is_learnt, list[tuple[float, float]]()
+    for again in range(ITERATIONS):
         bases = carried_bases(now.tangents)
         linear = linearise_all(looks, now, bases, extra)
         solution = solve_equations(
@@ -76,15 +77,26 @@ def adjust_hole(
             raise np.linalg.LinAlgError("expected a step of the unknowns, got numbers that are none")
         now = _stepped(now, bases, solution)
         found = Adjusted(looks, string, path, extra, now, linear, solution, known)
-        play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)
-        whole, legs = learnt_curvature(found)
-        is_bent = bool(np.all(np.abs(legs - now.leg_vars) <= LEGS_SETTLED * now.leg_vars))
-        if solution.step < SETTLED and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var and is_bent:
+        if not is_learnt:
+            play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)
+            if again and not is_bent:  # the first step was not along the sphere
+                whole, legs = learnt_curvature(found)
+                is_bent = bool(np.all(np.abs(np.log(legs / now.leg_vars)) <= LEGS_SETTLED))
+            is_learnt = solution.step < NEAR and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var and is_bent
+        if is_learnt and solution.step < SETTLED:
             break
-        tried = [*tried, (now.play_var, play)] if solution.step < NEAR else []
-        play = faster_play(tried) if tried else play
-        now = replace(now, play_var=play, curvature_var=whole, leg_vars=legs)
+        if not is_learnt:
+            tried = [*tried, (now.play_var, play)] if solution.step < NEAR else []
+            now = replace(now, play_var=faster_play(tried) if tried else play)
+        if again and not is_bent:
+            whole, legs = (part_of_way(*pair) for pair in ((now.curvature_var, whole), (now.leg_vars, legs)))
+            now = replace(now, curvature_var=float(whole), leg_vars=legs)
     return found
+
+
+def part_of_way(before: Array | float, after: Array | float) -> Array:
+    """Most of the way from variances to others, by their logarithms, for a whole step goes too far."""
+    return np.asarray(before * (after / before) ** PART)
 
 
 def linearise_all(looks: Looks, now: StartingPoint, bases: Array, extra: FurtherEffects) -> Linearised:

@@ -17,7 +17,14 @@ import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.collar import collar_departure
-from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, BlunderKind, Hypothesis, all_hypotheses
+from groundstation.survey.adjustment.hypotheses import (
+    BY_DEPTH,
+    KNOWN_SIZE,
+    WIDTHS,
+    BlunderKind,
+    Hypothesis,
+    all_hypotheses,
+)
 from groundstation.survey.adjustment.looks import Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.scores import Score, log_chances, log_tail, score_hypotheses
@@ -33,6 +40,9 @@ AS_GOOD = 0.3  # part of the best's logarithm that is worth trying; play hides t
 PARTED = math.log(100.0)  # by how much the best outdoes the second, or it is a doubt
 MOST_BLUNDERS = 4
 COLLAR = Hypothesis(BlunderKind.COLLAR_WRONG, ())
+TUBES_MISCOUNTED = (
+    1.5  # spacings of the stations by which a depth may be off: a tube too many, and what it is off beside
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,11 +112,6 @@ class Examination:
         """Weighted squares of what is left over what they are to be: 1 in an honest hole."""
         return global_ratio(self.adjusted)
 
-    @property
-    def doubts_collar(self) -> bool:
-        """Whether what was told of the collar counts no more, for a blunder or the suspicion of one."""
-        return COLLAR in _taken_in([*self.blunders, *filter(None, [self.suspicion])])
-
 
 def global_ratio(found: Adjusted) -> float:
     """Weighted squares of what the looks leave over what they are to be."""
@@ -130,7 +135,7 @@ def examine_hole(
     known : blunders that were found before, which are taken in; a doubt among them is judged again
     """
     known = tuple(_judged_again(looks, string, path, run, known, place) for place in range(len(known)))
-    now = adjust_with(looks, string, path, run, _taken_in(known), start)
+    now = _begun(looks, string, path, run, _taken_in(known), start)
     found, suspicion = list(known), None
     while suspicion is None and len(found) < MOST_BLUNDERS and is_suspicious(now.found, run):
         blunder = find_blunder(looks, string, path, run, now, _taken_in(found))
@@ -143,6 +148,47 @@ def examine_hole(
         now = adjust_with(looks, string, path, run, _taken_in([*found, *filter(None, [suspicion])]), now.found.now)
     blunders = tuple(_resized(one, now, _taken_in(found)) for one in found)
     return Examination(now.found, blunders, suspicion)
+
+
+def _begun(
+    looks: Looks,
+    string: StringPrior,
+    path: PathPrior,
+    run: RunOfStops,
+    taken_in: tuple[Hypothesis, ...],
+    start: StartingPoint | None,
+) -> TakenIn:
+    """A hole adjusted with what is known to be wrong; before more is blamed, play and bends are learnt of all looks."""
+    if start is None or not start.is_learnt:
+        return adjust_with(looks, string, path, run, taken_in, start)
+    if not taken_in:
+        now = adjust_with(looks, string, path, run, (), start)
+        if not is_suspicious(now.found, run):
+            return now
+    return adjust_with(looks, string, path, run, taken_in, replace(start, is_learnt=False))
+
+
+def examine_known(
+    looks: Looks,
+    string: StringPrior,
+    path: PathPrior,
+    run: RunOfStops,
+    before: Examination | None = None,
+    start: StartingPoint | None = None,
+) -> tuple[Examination, bool]:
+    """Adjust a hole with what was found before, and say whether more seems to be wrong, without looking for it.
+
+    Where nothing was found before and nothing seems to be wrong it comes to the same as ``examine_hole``.
+
+    Parameters
+    ----------
+    looks, string, path, run, start : as of ``examine_hole``
+    before : of fewer looks, whose stations, stops and tubes have the places that they had
+    """
+    known, suspicion = ((), None) if before is None else (before.blunders, before.suspicion)
+    now = _begun(looks, string, path, run, _taken_in([*known, *filter(None, [suspicion])]), start)
+    blunders = tuple(_resized(one, now, _taken_in(known)) for one in known)
+    return Examination(now.found, blunders, suspicion), is_suspicious(now.found, run)
 
 
 def _resized(blunder: Blunder, now: TakenIn, taken_in: tuple[Hypothesis, ...]) -> Blunder:
@@ -179,7 +225,13 @@ def find_blunder(
         return None
     many = log_of_level(looks, run)
     adjusted = [_tried(looks, string, path, run, found, known, one) for one in worth]
-    tried = [(with_one, _explained(with_one, found, one, many)) for with_one, one in zip(adjusted, worth, strict=True)]
+    tried = [
+        (with_one, _explained(with_one, found, one, many))
+        for with_one, one in zip(adjusted, worth, strict=True)
+        if is_plausible(one, with_one.sizes[-1], run)
+    ]
+    if not tried:
+        return None
     tried.sort(key=lambda pair: pair[1].log_chance)
     with_best, best = tried[0]
     second = tried[1][1] if len(tried) > 1 else None
@@ -193,6 +245,12 @@ def _score_of_collar(found: Adjusted, known: tuple[Hypothesis, ...]) -> list[Sco
     off = collar_departure(found)
     free = np.asarray(np.linalg.pinv(off.cov), np.float64)[None]
     return [Score((COLLAR,), off.size[None], free, np.array([off.told], np.intp), np.array([off.squares]))]
+
+
+def is_plausible(one: Hypothesis, size: Array, run: RunOfStops) -> bool:
+    """Whether a blunder of a size can be: a depth is off by a tube that was not counted, never by half of the hole."""
+    spacing = float(np.max(np.diff(run.station_md), initial=0.0))
+    return one.kind not in BY_DEPTH or abs(float(size[0])) <= TUBES_MISCOUNTED * spacing
 
 
 def chance_of_one(looks: Looks, run: RunOfStops) -> float:

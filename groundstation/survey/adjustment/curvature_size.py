@@ -23,13 +23,14 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 HOLE_KNOWN_AS = 6.0  # directions that the size of the hole's curvature before them counts for
 LEG_KNOWN_AS = 4.0  # likewise of one leg, that of the hole: the degrees of freedom of its tails
+TOGETHER = 4  # rounds
 LEAST = 1e-12  # rad^2/m^2
 
 
 def learnt_curvature(found: Adjusted) -> tuple[float, Array]:
     """Variance (rad^2/m^2) of the curvature of the hole, and that by which each leg (s,) is driven.
 
-    It is a step of iteration. The departures of the legs are weighed as they stand, so the two settle together.
+    It is a step of iteration, in which the two settle together for the departures as they stand.
     """
     before, legs = found.path.curvature_std**2, found.now.leg_vars
     if not len(legs):
@@ -38,13 +39,15 @@ def learnt_curvature(found: Adjusted) -> tuple[float, Array]:
     off = path_departures(found.path, found.now, found.linear.bases, go)
     seen = np.einsum("ka,kab,kb->k", off, rigid, off)
     free = off.shape[1] - np.einsum("kab,kba->k", rigid, departure_covs(found, go)) / legs
-    weights = found.now.curvature_var / legs
     at_collar = found.now.curvatures[0]
-    seen_at_all = float(weights @ seen) + float(at_collar @ at_collar)
-    free_at_all = float(free.sum()) + 2.0 - float(np.trace(found.covs[0, 2:, 2:])) / found.now.curvature_var
-    whole = (HOLE_KNOWN_AS * before + seen_at_all) / (HOLE_KNOWN_AS + free_at_all)
-    each = (LEG_KNOWN_AS * whole + seen) / (LEG_KNOWN_AS + free)
-    return max(whole, LEAST), np.maximum(each, LEAST)
+    free_at_collar = 2.0 - float(np.trace(found.covs[0, 2:, 2:])) / found.now.curvature_var
+    known = HOLE_KNOWN_AS * before + float(at_collar @ at_collar)
+    known_as = HOLE_KNOWN_AS + free_at_collar + float(free.sum())
+    whole = found.now.curvature_var
+    for _ in range(TOGETHER):
+        legs = (LEG_KNOWN_AS * whole + seen) / (LEG_KNOWN_AS + free)
+        whole = (known + whole * float(np.sum(seen / legs))) / known_as
+    return max(whole, LEAST), np.maximum(legs, LEAST)
 
 
 def curvature_deviance(now: StartingPoint, before: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -64,7 +65,12 @@ def path_equations(path: PathPrior, start: StartingPoint, bases: Array) -> tuple
 
 def leg_steps(path: PathPrior) -> tuple[Array, Array]:
     """How the state of a station goes on to the next (s, 4, 4), and the information (s, 4, 4) of a curvature of 1."""
-    steps = [process_step(length, path.correlation_length) for length in np.diff(path.md).tolist()]
+    return _steps_of(path.md.tobytes(), path.correlation_length)
+
+
+@lru_cache(maxsize=4)  # one adjustment asks for its own again and again
+def _steps_of(md: bytes, correlation_length: float) -> tuple[Array, Array]:
+    steps = [process_step(length, correlation_length) for length in np.diff(np.frombuffer(md)).tolist()]
     go = np.array([step[0][1:, 1:] for step in steps]).reshape(-1, 2, 2)
     noise = np.array([step[1][1:, 1:] for step in steps]).reshape(-1, 2, 2)
     return _for_both_axes(go), _for_both_axes(np.asarray(np.linalg.inv(noise), np.float64))

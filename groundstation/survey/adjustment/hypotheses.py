@@ -232,7 +232,7 @@ def _of_joints(looks: Looks, run: RunOfStops, onsets: set[int]) -> Iterator[Hypo
 
 
 def _of_hole(looks: Looks, onsets: set[int]) -> Iterator[Hypothesis]:
-    """Neighbouring stations that moved together: those with looks of at least two tubes from a stop on."""
+    """Neighbouring stations that moved together, or all that were looked at before a stop and from it on."""
     last = int(looks.station.max(initial=0))
     for stop in sorted(onsets):
         since = looks.stop >= stop
@@ -241,3 +241,5 @@ def _of_hole(looks: Looks, onsets: set[int]) -> Iterator[Hypothesis]:
         for first, width in itertools.product(seen, range(2, MOST_MOVED + 1)):
             if set(range(first, first + width)) <= set(seen):
                 yield Hypothesis(K.HOLE_MOVED, (first, first + width - 1), stop)
+        if len(seen) > MOST_MOVED:
+            yield Hypothesis(K.HOLE_MOVED, (seen[0], seen[-1]), stop)

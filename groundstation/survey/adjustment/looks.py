@@ -113,7 +113,14 @@ class FurtherEffects:
 
 @dataclass(frozen=True, slots=True)
 class StartingPoint:
-    """Where an iteration begins: what an earlier adjustment of nearly the same looks came to."""
+    """Where an iteration begins: what an earlier adjustment of nearly the same looks came to.
+
+    Parameters
+    ----------
+    tangents, curvatures, tubes, make_ups, gravity, extra : the unknowns
+    play_var, curvature_var, leg_vars : how far tubes lie askew, and how the hole bends, as the looks have told it
+    is_learnt : these are learnt of so many looks that a few more do not change them, and stay as they are
+    """
 
     tangents: Array  # (s + 1, 3)
     curvatures: Array  # (s + 1, 2) rad/m
@@ -124,3 +131,4 @@ class StartingPoint:
     curvature_var: float  # rad^2/m^2, of the hole
     leg_vars: Array  # (s,) rad^2/m^2, by which each leg is driven
     extra: Array = field(default_factory=lambda: np.zeros(0))
+    is_learnt: bool = False

@@ -66,6 +66,7 @@ class AdjustmentAnswer:
     misfit: Annotated[float | None, "weighted squares of what is left over what they are to be: 1 is as it should be"]
     play_deg: Annotated[float | None, "by which tubes lie askew in the hole from stop to stop, as the surveys show it"]
     sigma_toe_cm: Annotated[float | None, "standard deviation at the toe, the larger of north and east"]
+    searched: Annotated[int, "surveys by which it was looked for what is wrong; of the newest that may still go on"]
     blunders: list[BlunderRow]
     toe: list[ToeShare]
     tubes: list[AdjustedTube]

@@ -444,6 +444,8 @@ export interface AdjustmentAnswer {
   play_deg: number | null;
   /** standard deviation at the toe, the larger of north and east */
   sigma_toe_cm: number | null;
+  /** surveys by which it was looked for what is wrong; of the newest that may still go on */
+  searched: number;
   blunders: BlunderRow[];
   toe: ToeShare[];
   tubes: AdjustedTube[];
