@@ -35,7 +35,7 @@ from sim.rig.in_process import InProcessStepper, carry_unwritten
 from sim.rig.launcher import Tick
 from sim.rig.processes import ProcessTable
 from sim.rig.realtime_run import cpu_seconds, memory_footprint, running_pids
-from sim.rig.scheduler import RigProgress
+from sim.rig.rig_progress import RigProgress
 from sim.rig.stepper import Answer, FrameEvent
 from telemetry.messages import BASE, ENCODER
 from telemetry.runtime.stepped import Due

@@ -29,7 +29,7 @@ def test_a_scenario_whose_crew_tells_everything_is_ready() -> None:
     status, told, _ = check("rig-3")
     assert status == 0
     assert told.splitlines()[0] == "READY TO DRILL"
-    assert "assumed  length of 3 tubes ± 0.005 m, as it is made: 0.9 cm at the toe along the hole" in told
+    assert "assumed  length of 3 tubes ± 0.001 m, as it is made: 0.2 cm at the toe along the hole" in told
 
 
 def test_what_a_crew_does_not_tell_is_named(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from full_stops import survey_stop
 from hand_fed import Rig
 from served import Served, serving
 
@@ -268,6 +269,7 @@ def test_an_answer_is_missed_that_is_of_before_its_path_changed_or_of_a_former_s
         wall=at(2, 2),
         alarms=at(1, 4),
         setup=at(1, 4),
+        adjustment=at(1, 4),
     )
     assert known.missed == []
     rows = [
@@ -322,14 +324,50 @@ async def test_north_is_missed_on_the_setup_panel_told_in_a_line_and_taken_back(
             assert "NOT READY TO DRILL, not told: north" in lines
             assert "next: tell north: cmd/north?action=tell;angle_deg=..;sigma_deg=.." in lines
             head = next(place for place, line in enumerate(lines) if line.startswith("item"))
-            assert lines[head + 1].split()[:4] == ["north", "3.7", "any", "104"]
+            assert lines[head + 1].split()[:4] == ["north", "0.5", "any", "104"]
+            assert "costs most at the toe: bends of the hole, 1.5 cm" in lines
             await pilot.press("o", *"north action=tell angle_deg=12.5 sigma_deg=0.3", "enter")
             text = await until(app, served, lambda text: "\nREADY TO DRILL" in text, speaks_of(3))
-            assert "next: align tube 3 in slow turns: cmd/align?tube=3" in text
+            assert "next: align tube 1 in slow turns: cmd/align?tube=1" in text
             await pilot.press("o", *"setup action=undo", "enter")
             await until(app, served, lambda text: "NOT READY TO DRILL, not told: north" in text, speaks_of(3))
             await pilot.press("o", *"what", "escape", "u")
             await until(app, served, lambda text: "of the tolerance" in text, speaks_of(3))
+
+
+async def test_what_the_tubes_say_opens_with_one_key_and_names_a_sensor_that_stepped(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, target=20.0, accelerometer_bias_std_deg=0.06, mount_tilt_std_deg=0.05, north_std_deg=0.3)
+    rig.run(5.0)
+    for stop in range(1, 5):
+        survey_stop(rig, stop)
+    with serving(rig) as served, connect_to_ground(served.endpoint, timeout=10.0) as ground:
+        app = CrewApp(ground, "rig-1", "anna", Clock())
+        async with app.run_test(size=SIZE) as pilot:
+            await pilot.press("w")
+            text = await until(app, served, lambda text: "all 10 readings fit together" in text, speaks_of(4))
+            lines = [line.rstrip() for line in text.splitlines()]
+            assert len(lines) <= SIZE[1]
+            assert "all 10 readings fit together: nothing is wrong" in lines
+            assert any(line.startswith("next stop: ") for line in lines)
+            head = next(place for place, line in enumerate(lines) if line.startswith("sigma "))
+            sigma = float(lines[head].split()[1])
+            parts = [line.split(maxsplit=3) for line in lines[head + 1 : head + 6]]
+            parts = [one for one in parts if one[2:3] == ["%"]]
+            assert len(parts) >= 3
+            assert sum(float(cm) ** 2 for cm, *_ in parts) ** 0.5 == pytest.approx(sigma, rel=0.1)
+            assert any(line.startswith("not in it: ") for line in lines)
+
+            def stepped(hand: Rig) -> None:
+                for stop in range(5, 8):
+                    survey_stop(hand, stop, 0.16)
+
+            await asyncio.to_thread(served.do, stepped)
+            text = await until(app, served, lambda text: "1 THING IS WRONG" in text, speaks_of(7))
+            assert "accelerometer of tube 3 steps by" in text
+            assert "\nor mount of tube 3 tilted by" in text
+            assert "\ndo: go on, it is put right; calibrate tube 3 or change it when it is out; toe " in text
+            await pilot.press("w")
+            await until(app, served, lambda text: "of the tolerance" in text, speaks_of(7))
 
 
 def speaks_of(tubes: int) -> Callable[[Rig], None]:

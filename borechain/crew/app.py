@@ -15,6 +15,7 @@ from textual.widgets import Input, Static
 
 from borechain.client import ClientError
 from borechain.crew import screen_panels
+from borechain.crew.checks_panel import checks_panel
 from borechain.crew.picture import PATHS, Picture, View
 from borechain.crew.setup_panel import parse_order, setup_panel
 from telemetry.errors import BorechainError
@@ -55,7 +56,7 @@ class CrewApp(App[None]):
     #verdict { height: 3; margin-bottom: 1; }
     #middle { height: 11; }
     #plan { width: 23; } #strip { width: 27; padding-left: 1; } #string { width: 30; padding-left: 1; }
-    #setup { height: 11; display: none; }
+    #setup, #checks { height: 11; display: none; }
     #alarms { height: 5; } #actions { height: 2; }
     #order { height: 1; border: none; padding: 0; display: none; }
     """
@@ -65,13 +66,14 @@ class CrewApp(App[None]):
         Binding("t", "take_survey", "take survey"),
         Binding("d", "accept_depth", "accept depth"),
         Binding("u", "show_setup", "setup"),
+        Binding("w", "show_checks", "what the ± is made of"),
         Binding("o", "type_order", "order"),
         Binding("escape", "leave_order", "leave the order", show=False),
         Binding("down", "choose(1)", "next alarm"),
         Binding("up", "choose(-1)", "previous alarm"),
         Binding("q", "quit", "quit"),
     ]
-    HELP = "[a]cknowledge [s]helve [t]ake survey accept [d]epth set[u]p [o]rder [q]uit"
+    HELP = "[a]cknowledge [s]helve [t]ake survey [d]epth ok set[u]p [w]hy ± [o]rder [q]uit"
 
     def __init__(
         self,
@@ -101,6 +103,7 @@ class CrewApp(App[None]):
             yield Static(id="strip")
             yield Static(id="string")
         yield Static(id="setup")
+        yield Static(id="checks")
         yield Static(id="alarms")
         yield Static(id="actions")
         yield Input(
@@ -135,6 +138,7 @@ class CrewApp(App[None]):
             ("strip", screen_panels.strip_panel(picture)),
             ("string", screen_panels.string_panel(picture)),
             ("setup", setup_panel(picture, datetime.datetime.now(datetime.UTC))),
+            ("checks", checks_panel(picture)),
             ("alarms", screen_panels.alarms_panel(picture, self._chosen, ALARM_ROWS)),
             ("actions", screen_panels.actions_panel(picture, ACTION_ROWS)),
         ):
@@ -176,8 +180,17 @@ class CrewApp(App[None]):
 
     def action_show_setup(self) -> None:
         """Show the setup in place of plan, strip and string, or those again."""
-        panel, middle = self.query_one("#setup"), self.query_one("#middle")
-        middle.display, panel.display = panel.display, middle.display
+        self._show("#setup")
+
+    def action_show_checks(self) -> None:
+        """Show what the tubes say about each other in place of plan, strip and string, or those again."""
+        self._show("#checks")
+
+    def _show(self, name: str) -> None:
+        """Show one of the panels in the middle of the screen; what is there already gives way to the first."""
+        name = "#middle" if self.query_one(name).display else name
+        for panel in ("#middle", "#setup", "#checks"):
+            self.query_one(panel).display = panel == name
 
     def action_type_order(self) -> None:
         """Have an order typed in the last line."""

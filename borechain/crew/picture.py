@@ -12,7 +12,17 @@ from typing import Any
 
 View = dict[str, Any]
 FRESH_WITHOUT_WORD = 4.5  # s, until a ground station has said how long its verdict is good
-PATHS = ("status", "verdict", "string", "column", "wall", "alarms", "orders", "setup")  # asked for at the beginning
+PATHS = (
+    "status",
+    "verdict",
+    "string",
+    "column",
+    "wall",
+    "alarms",
+    "orders",
+    "setup",
+    "adjustment",
+)  # asked for at the beginning
 NODES = "nodes/"
 MILD, SERIOUS, GRAVE = "notice", "degraded", "bad"
 KEEP_OUT = "do not drill on by this screen until the cause is mended"

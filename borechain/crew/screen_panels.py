@@ -39,7 +39,8 @@ def verdict_panel(picture: Picture, now: float) -> Text:
     """Three lines: the word and the numbers, what to do, why."""
     found = picture.verdict(now)
     style = STYLES[found["verdict"]]
-    lines = [short_line(found["line"]), found["todo"], "; ".join(found["why"])]
+    reasons = [why for why in found["why"] if not found["line"].endswith(why)]
+    lines = [short_line(found["line"]), found["todo"], "; ".join(reasons)]
     if found["verdict"] == "dont_know" and found["by_surveys"] != "dont_know":
         lines[1] = f"the surveys alone said {found['by_surveys'].replace('_', ' ')}; do not count on it"
     return Text("\n").join(fit_line(f" {line}", style) for line in lines)

@@ -11,20 +11,21 @@ from borechain.crew.picture import Picture
 from borechain.crew.screen_panels import PLAN_HEIGHT, QUIET, fit_line
 
 View = dict[str, Any]
-HEAD_LINES = 3
+HEAD_LINES = 4
 HOUR_MIN = 90.0  # min, from which on an age is told in hours
 LEAST_CM = 0.05  # at the toe, below which nothing is lost by what was not told
 
 
 def setup_panel(picture: Picture, now_utc: datetime.datetime) -> Text:
-    """Eleven lines: ready or not, what to do next, and the items, what is missing first."""
+    """Eleven lines: ready or not, what costs most, what to do next, and the items, what is missing first."""
     found = picture.answers.get("setup")
     if found is None:
         return Text("setup: not heard yet".ljust(80), QUIET)
     told = "READY TO DRILL: north and every joint are told"
     ready = told if found["ready"] else f"NOT READY TO DRILL, not told: {', '.join(found['missing'])}"
     lines = [fit_line(ready, "bold" if found["ready"] else "bold white on magenta")]
-    lines += [fit_line(f"next: {found['todo']}", "")]
+    lines += [fit_line(f"costs most at the toe: {found['costs_most']}", "bold")]
+    lines += [fit_line(f"next: {found['todo']}", "bold")]
     lines += [fit_line(f"{'item':15} {'toe cm':>6} {'value':>15} {'sigma':>9} {'unit':6} {'age':>6} source", "bold")]
     lines += [setup_line(row, now_utc) for row in found["items"][: PLAN_HEIGHT - HEAD_LINES]]
     return Text("\n").join(lines)

@@ -18,8 +18,8 @@ from sim.errors import RigError, ScenarioError
 from sim.rig.ground_answers import ASKED
 from sim.rig.launcher import next_run_folder, prepare_folder
 from sim.rig.report import write_files
+from sim.rig.rig_progress import RigProgress
 from sim.rig.rig_result import rig_result
-from sim.rig.scheduler import RigProgress
 from sim.world.scenario import load_scenario
 from sim.world.world import World
 from telemetry.media.zenoh_bus import ZenohBus

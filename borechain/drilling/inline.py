@@ -24,7 +24,8 @@ from sim.errors import RigError
 from sim.rig.in_process import Build, InProcessStepper, carry_unwritten
 from sim.rig.launcher import private_folder
 from sim.rig.rack_operator import RackOperator
-from sim.rig.scheduler import RigProgress, Scheduler
+from sim.rig.rig_progress import RigProgress
+from sim.rig.scheduler import Scheduler
 from sim.rig.stepper import Acted
 from sim.world.world import World
 from telemetry.errors import BorechainError

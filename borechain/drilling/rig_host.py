@@ -43,7 +43,8 @@ def run_medium(
     which one of the scenario's site is drilled.
     """
     from sim.rig.bus_stepper import BusStepper
-    from sim.rig.scheduler import RigProgress, Scheduler
+    from sim.rig.rig_progress import RigProgress
+    from sim.rig.scheduler import Scheduler
     from sim.world.scenario import load_scenario
     from sim.world.world import World
     from telemetry.radio.soil_dielectric import PorosityWarning
@@ -122,7 +123,7 @@ def opened_router(endpoint: str, keys_place: Path | None = None) -> AbstractCont
 
 def pack_progress(progress: object) -> bytes:
     """Wire form of the medium's progress, read by the launcher's ``Tick``."""
-    from sim.rig.scheduler import RigProgress
+    from sim.rig.rig_progress import RigProgress
 
     if not isinstance(progress, RigProgress):
         raise TypeError(f"expected Progress, got {type(progress).__name__}")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from borechain.crew.log import RunLog
     from groundstation.gateway.page.page_settings import PageSettings
     from sim.rig.launcher import Tick
-    from sim.rig.scheduler import RigProgress
+    from sim.rig.rig_progress import RigProgress
     from sim.world.world import World
 
 ShowProgress: TypeAlias = "Callable[[Tick | RigProgress], None]"

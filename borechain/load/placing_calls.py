@@ -20,17 +20,18 @@ from borechain.load.crowd import ROUND_S, TUBE_LENGTH
 from borechain.load.day import ADVANCE, ADVANCES, BEGUN_AT, depth_of, write_day
 from borechain.load.learning import RIG, LearningLoad
 from groundstation.config import checked_config
+from groundstation.survey.fusion.fusion import Weighting
 
 TUBES, STOPS = 10, 10
-CALLS_AT_MOST = 300
+CALLS_AT_MOST = {Weighting.BAYES: 300, Weighting.ADJUSTED: 2400}  # an adjustment works the whole hole out
 OURS = str(Path(groundstation.__file__).parent)
 CLOCKS = str(Path(groundstation.__file__).parent / "recording")
 
 
-def count_placing_calls(folder: Path) -> list[int]:
+def count_placing_calls(folder: Path, weighting: Weighting) -> list[int]:
     """Calls for every measurement of a stop, each of which comes alone; ten stops of ten tubes are known."""
     settings: dict[str, Any] = {"tube_length": TUBE_LENGTH, "target": TUBE_LENGTH * (TUBES + ADVANCES * ADVANCE)}
-    config = checked_config(rig=RIG, folder=folder, **settings)
+    config = checked_config(rig=RIG, folder=folder, weighting=weighting, **settings)
     write_day(config.url, STOPS, TUBES)
     load = LearningLoad(config, TUBES, BEGUN_AT + ROUND_S * (STOPS + 1))
     with contextlib.closing(load.ground):

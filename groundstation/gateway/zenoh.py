@@ -32,6 +32,7 @@ BUSY = f"the ground station has {WAITING} questions to answer; ask again later"
 COMMON_PARAMETERS = ("accept",)
 ENCODINGS = {"json": JSON, "msgpack": MSGPACK}
 INTAKE_AT_ONCE = 500  # events of one answer
+WHEN_HEARD = (*BEATS, "adjustment")  # put if there is a listener: the former are frequent, the latter is dear
 PRIVATE = ("folder", "key_file", "keys", "database_url", "wall", "hole")  # settings that are not published
 WHO = "zenoh"  # ordered, where the order does not say
 
@@ -129,7 +130,7 @@ class ZenohGateway:
     def _put(self, path: str) -> None:
         if path not in self._publishers:
             self._publishers[path] = self._bus.publisher(self._key(path), JSON, droppable=True)
-        if path not in BEATS or self._publishers[path].is_heard:
+        if path not in WHEN_HEARD or self._publishers[path].is_heard:
             self._publishers[path].put(self._news(path))
 
     def _publish_intake(self) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from sim.gauntlet.faulty_disk import PowerCutError
 from sim.gauntlet.faulty_world import FaultyWorld
 from sim.rig.in_process import Build, InProcessStepper, step_process
-from sim.rig.scheduler import RigProgress
+from sim.rig.rig_progress import RigProgress
 from sim.rig.stepper import Answer, FrameEvent
 from telemetry.errors import BorechainError
 from telemetry.messages import BASE

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from sim.errors import RigError
-from sim.rig.scheduler import RigProgress
+from sim.rig.rig_progress import RigProgress
 from sim.rig.stepper import Acted, Answer, FrameEvent
 from telemetry.messages import address_name
 from telemetry.runtime.process_interface import Process

@@ -16,13 +16,15 @@ import queue
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 
 from node.kernels.arithmetic.formats import PERIOD
 from sim.errors import RigError
 from sim.rig.link_channel import LinkChannel
+from sim.rig.port_ends import is_cable, join_ends, radio_hearers
 from sim.rig.radio_channel import RadioChannel
+from sim.rig.rig_progress import ATTACH_LIMIT, RigProgress, give_up
 from sim.rig.stepper import Acted, Answer, FrameEvent, Stepper
 from sim.world.motion import SchedulePhase
 from sim.world.world import World
@@ -32,41 +34,13 @@ from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.runtime.stepped import Due, DueEvent
 from telemetry.unwritten import Content
 
-ATTACH_LIMIT = 90.0  # wall s
 FROZEN_AFTER = 30.0  # wall s of it, after which a process that was there is ended
 TELL_EVERY = 0.5  # wall s
 CUE_LIMIT = 120.0  # wall s
 CUE_AGAIN = 2.0  # rig s, until an operator who was too early tries again
 REBOOT_TIME = 5.0  # rig s that a process may be missing before the rig's time waits for it
-FRAME_AT = {Side.UPPER: Due.UPPER_FRAME, Side.LOWER: Due.LOWER_FRAME}  # event of a frame that comes in at an end
 CYCLE, TIMER = Due.CYCLE, Due.TIMER
 Entry = tuple[float, int, int, int, "Due | None", Content, "float | None"]
-
-
-@dataclass(slots=True)
-class RigProgress:
-    """What the rig is doing, for display."""
-
-    phase: str
-    rig_time: float
-    begin: float
-    end: float
-    wanted: list[int] = field(default_factory=list)
-    kill: list[int] = field(default_factory=list)
-    finished: bool = False
-    cue: str = ""  # what the operator is to do now
-
-
-def give_up(name: str, waited: float) -> None:
-    """Wait no longer for a process that was started and does not come.
-
-    Raises
-    ------
-    RigError
-        After ``ATTACH_LIMIT``.
-    """
-    if waited >= ATTACH_LIMIT:
-        raise RigError(f"process {name} did not attach within {ATTACH_LIMIT:.0f} s")
 
 
 class Scheduler:
@@ -395,32 +369,15 @@ class Scheduler:
 
     def _radiate(self, radio: RadioChannel, sender: int, side: Side, at: float, frame: Content) -> None:
         """Have every end hear a frame that its radio reaches, in a closed string up to the drive head."""
-        chain = (ENCODER, *self._string)
-        if sender not in chain:
-            return
-        place = chain.index(sender)
-        for away in range(1, radio.reach + 1):
-            other = place + (away if side is Side.LOWER else -away)
-            if not 0 <= other < len(chain) or (self._open_top and 0 in (place, other)):
-                return
-            joints = chain[min(place, other) + 1 : max(place, other) + 1]
-            facing = Side.UPPER if side is Side.LOWER else Side.LOWER
-            for delay, arriving, margin in radio.deliveries(sender, side, chain[other], joints, at, bytes(frame)):
-                self._push(at + delay, chain[other], FRAME_AT[facing], arriving, margin)
+        heard = radio_hearers(self._string, sender, side, radio.reach, open_top=self._open_top)
+        for other, kind, joints in heard:
+            for delay, arriving, margin in radio.deliveries(sender, side, other, joints, at, bytes(frame)):
+                self._push(at + delay, other, kind, arriving, margin)
 
     def _join(self, string: tuple[int, ...], *, open_top: bool = False) -> None:
         """Have these tubes hang, top first, and every port look into another; not through an open joint at the head."""
-        self._string, self._open_top, self._ends = string, open_top, {}
-        for upper, lower in itertools.pairwise((BASE, ENCODER, *string)):
-            if upper == ENCODER and open_top:
-                continue
-            self._ends[upper, Side.LOWER] = lower, FRAME_AT[Side.UPPER]
-            self._ends[lower, Side.UPPER] = upper, FRAME_AT[Side.LOWER]
-
-
-def is_cable(address: int, side: Side) -> bool:
-    """Whether a port is of the cable between the base station and the drive head."""
-    return address == BASE or (address == ENCODER and side is Side.UPPER)
+        self._string, self._open_top = string, open_top
+        self._ends = join_ends(string, open_top=open_top)
 
 
 @dataclass(frozen=True, slots=True)

@@ -140,7 +140,7 @@ def hand_down(
     """
     top, is_there, dated_late = schedule.powered[cycle], schedule.is_sent[cycle], schedule.dated_late
     records, settings = nodes.records, nodes.settings
-    aiding[:] = schedule.measured[cycle]
+    copy_aiding(schedule.measured[cycle], aiding)
     valid = aiding[A_VALID]
     for hop in range(top):
         k, is_taken = top - 1 - hop, False
@@ -153,8 +153,15 @@ def hand_down(
             pass_on(records[k], aiding)
         else:
             is_there = estimates.told[k]
-            aiding[:] = estimates.said[k]
+            copy_aiding(estimates.said[k], aiding)
             valid = aiding[A_VALID]
+
+
+@shared_body
+def copy_aiding(said: Array, aiding: Array) -> None:
+    """Copy what was ``said`` (AIDING,) into an ``aiding``: number by number, for a slice is copied by way of memory."""
+    for field in range(aiding.shape[0]):
+        aiding[field] = said[field]
 
 
 @shared_body

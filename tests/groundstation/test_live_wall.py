@@ -49,7 +49,8 @@ class Site:
 
     def drill(self, hole: str, inclination_deg: float) -> list[dict[str, Any]]:
         """Drill a hole to its end, leaning north; returns what was shown after every stop."""
-        rig = Rig(self.folder / hole, target=8.0, wall=self.file, hole=hole)
+        bends = {"curvature_std_deg_per_m": 3.0}  # it may lean off at once
+        rig = Rig(self.folder / hole, target=8.0, wall=self.file, hole=hole, **bends)
         rig.run(5.0)
         shown = [rig.ask("wall")["wall"]]
         for stop in range(1, STOPS + 1):

@@ -9,6 +9,7 @@ import sqlalchemy as sa
 from hand_fed import COV, Rig
 
 from borechain.load.placing_calls import CALLS_AT_MOST, TUBES, count_placing_calls
+from groundstation.survey.fusion.fusion import Weighting
 from telemetry.messages import DepthReading, ImuMean, NodeFlag, Stand, SurveyMeasurement
 from telemetry.presentation.msgpack_codec import encode_message
 
@@ -96,9 +97,11 @@ def test_a_depth_that_is_doubted_before_the_survey_is_fused_is_taken_back(rig: R
 
 
 @pytest.mark.slow
-def test_one_more_measurement_is_placed_in_three_hundred_calls(tmp_path: Path) -> None:
+@pytest.mark.parametrize("weighting", [*CALLS_AT_MOST])
+def test_one_more_measurement_is_placed_in_few_calls(tmp_path: Path, weighting: Weighting) -> None:
     """From the arrival of its message to the hole that is worked out; the last tube of a stop costs as the first."""
-    counts = count_placing_calls(tmp_path)
+    counts = count_placing_calls(tmp_path, weighting)
     assert len(counts) == TUBES
-    assert max(counts) <= CALLS_AT_MOST == 300
+    assert CALLS_AT_MOST[Weighting.BAYES] == 300
+    assert max(counts) <= CALLS_AT_MOST[weighting]
     assert counts[-1] - min(counts) < 30

@@ -341,7 +341,7 @@ def test_priors_are_one_frozen_record_by_name(tmp_path: Path) -> None:
     assert before.by_name["north"].mean == ()
     assert before.by_name["collar"].sigma == pytest.approx(math.radians(1.0))
     assert before.by_name["mount.2"].sigma == pytest.approx(math.radians(0.5))
-    expected = {"joint.2-1", "joint.drive-2", "joint.drive-1", "length.1", "stick_up", "depth_scale", "depth_offset"}
+    expected = {"joint.2-1", "joint.drive-2", "joint.drive-1", "length.1", "stick_up", "depth_scale"}
     assert expected <= before.by_name.keys()
     assert {"accelerometer.1", "gyroscope.2", "mount_turn.1", "play", "path", "gravity"} <= before.by_name.keys()
     order(rig, "north", action="tell", angle_deg=12.5, sigma_deg=0.2)

@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numba.core.errors import NumbaError
 
-from node.kernels.arithmetic.compiler import ByAddress
+from node.kernels.arithmetic.compiler import COUNTED, ByAddress
 from node.kernels.arithmetic.formats import RATE_Q
 from node.kernels.arithmetic.jit import compile_function
 from node.kernels.arithmetic.operations import by_type
@@ -131,6 +132,31 @@ def test_a_kernel_holds_no_code_for_callers_in_c_unless_it_is_an_entry() -> None
         made(1.0)
         (code,) = made.inspect_llvm().values()
         assert ("cfunc." in code) is holds
+
+
+def test_a_kernel_counts_no_references_and_makes_no_array() -> None:
+    def make_sum(numbers: Any) -> float:
+        made = np.zeros(3)
+        made[:] = numbers
+        return float(made[0] + made[1] + made[2])
+
+    def move_down(numbers: Any) -> None:
+        numbers[:2] = numbers[1:]
+
+    def first_of(numbers: Any) -> float:
+        rest = numbers[1:]
+        return float(rest[0] if numbers[0] < 0.0 else numbers[0])
+
+    numbers = np.arange(1.0, 4.0)
+    for options, counts in (({}, False), (COUNTED, True)):
+        made = unkept(first_of, **options)
+        assert made(numbers) == 1.0
+        (code,) = made.inspect_llvm().values()
+        assert ("@NRT_" in code) is counts
+    assert unkept(make_sum, **COUNTED)(numbers) == 6.0
+    for refused in (make_sum, move_down):
+        with pytest.raises(NumbaError, match=r"array passed into the function|NRT required"):
+            unkept(refused)(numbers)
 
 
 def test_no_other_file_of_ours_leans_on_private_modules() -> None:

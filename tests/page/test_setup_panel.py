@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -27,6 +28,8 @@ def test_what_is_missing_is_named_told_by_a_driller_and_taken_back(rig: Beating,
     expect(page.locator("#told")).to_have_text("not told: north")
     expect(page.locator("#ready")).to_have_text("NOT READY TO DRILL, not told: north")
     expect(page.locator("#next")).to_contain_text("Next: tell north")
+    expect(page.locator("#worst")).to_have_text(re.compile(r"Costs most at the toe: .*, [0-9.]+ cm"))
+    expect(page.locator("#how")).to_have_text("by the form below, or cmd/north?action=tell;angle_deg=..;sigma_deg=..")
     first = page.locator("#setup-items tr").first
     expect(first).to_have_class("grave")
     expect(first.locator("td").nth(2)).to_have_text("any")
@@ -39,7 +42,7 @@ def test_what_is_missing_is_named_told_by_a_driller_and_taken_back(rig: Beating,
     page.click("#sign-now")
     expect(page.locator("#ready")).to_have_text("Ready to drill: north and every joint are told")
     expect(page.locator("#word")).to_have_text("ON TARGET")
-    expect(page.locator("#next")).to_contain_text("align tube 3")
+    expect(page.locator("#next")).to_contain_text("align tube 1")
     told = page.locator("#setup-items tr", has_text="north")
     expect(told).to_contain_text("told: by anna")
     expect(told).to_contain_text("0 min")

@@ -10,8 +10,8 @@ from rigs import REPOSITORY, free_endpoint, running_rig
 from borechain.drilling.inline import InlineRig
 from borechain.pki.rig_keys import add_tube, init_rig, rotate_keys
 from sim.rig.ground_settings import ground_settings
+from sim.rig.rig_progress import RigProgress
 from sim.rig.rig_result import rig_result
-from sim.rig.scheduler import RigProgress
 from sim.world.scenario import load_scenario
 from sim.world.world import World
 from telemetry.messages import BASE, ENCODER, DepthReading, Side, SurveyMeasurement

@@ -25,7 +25,7 @@ from groundstation.service.answers.answer_table import schemas_by_path
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import IntakeError, pack_intake, unpack_intake
 from sim.rig.ground_settings import ground_settings
-from sim.rig.scheduler import RigProgress
+from sim.rig.rig_progress import RigProgress
 from sim.world.scenario import load_scenario, scenario_of
 from sim.world.world import World
 

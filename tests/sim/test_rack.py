@@ -10,7 +10,8 @@ from borechain.drilling.inline import InlineRig
 from groundstation.calibration.attitudes import true_vectors
 from node.kernels.arithmetic.formats import PERIOD
 from sim.errors import ScenarioError
-from sim.rig.scheduler import RigProgress, Scheduler
+from sim.rig.rig_progress import RigProgress
+from sim.rig.scheduler import Scheduler
 from sim.world.disturbance.drift import Drift
 from sim.world.rack import Rack
 from sim.world.scenario import Scenario, load_scenario

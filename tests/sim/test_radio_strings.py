@@ -15,7 +15,7 @@ import pytest
 from borechain.drilling.inline import InlineRig
 from node.process.tube_process import TubeProcess
 from sim.rig.ground_settings import ground_settings
-from sim.rig.scheduler import RigProgress
+from sim.rig.rig_progress import RigProgress
 from sim.studies.soil_link.wet_clay import expected_delivery, largest_difference, surveys_of, wet_clay
 from sim.world.marks import wrap_angle
 from sim.world.parsing import read_toml

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from sim.rig.launcher import Tick
-    from sim.rig.scheduler import RigProgress
+    from sim.rig.rig_progress import RigProgress
     from sim.world.world import World
 
 

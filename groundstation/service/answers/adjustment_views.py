@@ -3,53 +3,84 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
+from groundstation.service.answers.adjustment_words import (
+    CM,
+    LEFT_OUT,
+    NOTHING,
+    say_fit,
+    say_next_stop,
+    say_part,
+    say_second,
+    say_unfound,
+    size_found,
+)
 from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.shapes.adjustment_shapes import (
     AdjustedTube,
     AdjustmentAnswer,
     BlunderRow,
+    LeastFound,
     NextStopAdvice,
+    ToePart,
     ToeShare,
 )
 from groundstation.service.answers.streamed_rows import Parameters
-from groundstation.service.hole.examined_hole import ExaminedHole, std_across
+from groundstation.service.hole.examined_hole import LEVEL, ExaminedHole, std_across
 from groundstation.service.setup.setup_priors import north_std
 from groundstation.service.setup.toe_costs import TURN_MOST
-from groundstation.survey.adjustment.blunder_words import STANDARD_GRAVITY
+from groundstation.survey.adjustment.blunder_cost import BlunderCost
+from groundstation.survey.adjustment.blunder_words import STANDARD_GRAVITY, advise_crew, say_explanation, unit_of
 from groundstation.survey.adjustment.blunders import Blunder
+from groundstation.survey.adjustment.hypotheses import BlunderKind
+from groundstation.survey.adjustment.least_found import unfound_across, worst_of_kinds
+from groundstation.survey.adjustment.reliability import Reliability
 from groundstation.survey.adjustment.tube_biases import bias_of_tube
 
-MILLI_G = 1e-3 * STANDARD_GRAVITY  # m/s^2
-LEAST_SHOWN_CM = 1e-4  # of a share
+Array = npt.NDArray[np.float64]
+MILLI_G: Final = 1e-3 * STANDARD_GRAVITY  # m/s^2
+DECADE: Final = math.log(10.0)
+LEAST_SHOWN_CM: Final = 1e-4  # of a share
+IN_NO_LOOK: Final = ("north", "depth", "legs")
+STEP: Final = BlunderKind.BIAS_STEPPED
 
 
 @view_of(AdjustmentAnswer)
 def answer_adjustment(k: RigModel, _p: Parameters) -> AdjustmentAnswer:
     """The adjustment as it stands; empty before the first survey below the collar."""
-    examined = k.hole.examined
+    examined, counts = k.hole.examined, k.hole.is_adjusted
     if examined is None:
-        return AdjustmentAnswer(0, 0.0, None, None, None, 0, [], [], [], None)
-    found = examined.adjusted
+        return AdjustmentAnswer(0, 0.0, None, None, counts, NOTHING, None, None, 0, [], [], [], LEFT_OUT, [], [], None)
+    found, wrong = examined.adjusted, examined.examination.blunders
+    budget = budget_of_toe(k, examined)
     return AdjustmentAnswer(
         surveys=len(found.looks),
         redundancy=found.redundancy,
         misfit=examined.examination.global_ratio,
         play_deg=math.degrees(math.sqrt(found.now.play_var)),
-        sigma_toe_cm=100.0
-        * math.hypot(std_across(np.sum([share.variances for share in examined.shares], axis=0)), north_at_toe(k)),
+        counts=counts,
+        said=say_fit(len(found.looks), len(wrong), len(examined.doubts)),
+        toe_md_m=float(found.path.md[-1]),
+        sigma_toe_cm=CM * std_across(np.sum([one.variances for one in budget], axis=0)),
         searched=examined.surveys,
-        blunders=[blunder_row(examined, one) for one in examined.examination.blunders],
-        toe=toe_shares(k, examined),
+        blunders=[blunder_row(examined, *one) for one in zip(wrong, examined.costs, strict=True)],
+        toe=toe_shares(budget),
+        parts=toe_parts(budget),
+        left_out=LEFT_OUT,
+        unfound=[least_found(examined, one) for one in worst_of_kinds(examined.reliabilities)],
         tubes=[adjusted_tube(examined, place) for place in range(len(examined.tubes))],
-        next_stop=next_stop_advice(examined),
+        next_stop=next_stop_advice(examined, budget),
     )
 
 
-def blunder_row(examined: ExaminedHole, blunder: Blunder) -> BlunderRow:
+def blunder_row(examined: ExaminedHole, blunder: Blunder, cost: BlunderCost | None) -> BlunderRow:
     """One thing that is wrong."""
     best, second = blunder.best, blunder.second
     return BlunderRow(
@@ -58,49 +89,117 @@ def blunder_row(examined: ExaminedHole, blunder: Blunder) -> BlunderRow:
         from_md_m=float(examined.run.md[best.hypothesis.stop]),
         is_doubt=blunder.is_doubt,
         text=examined.sentence(blunder),
-        evidence=-best.log_chance / math.log(10.0),
+        evidence=-best.log_chance / DECADE,
         second_kind=None if second is None else second.hypothesis.kind.value,
-        second_evidence=None if second is None else -second.log_chance / math.log(10.0),
+        second_evidence=None if second is None else -second.log_chance / DECADE,
         misfit_before=blunder.before,
         misfit_after=blunder.after,
+        best=say_explanation(best, examined.run, examined.tubes),
+        second=second_best(examined, blunder),
+        moved_cm=None if cost is None else CM * float(np.hypot(*cost.moved[:2])),
+        sigma_cm=None if cost is None else CM * std_across(cost.variances),
+        todo=advise_crew(blunder, examined.tubes),
     )
 
 
-def north_at_toe(k: RigModel) -> float:
-    """Standard deviation (m) at the toe by the encoder's zero against north, which is in no look."""
-    return float(np.hypot(*k.hole.trajectory.positions[-1, :2])) * min(north_std(k.setup), TURN_MOST)
+def second_best(examined: ExaminedHole, blunder: Blunder) -> str | None:
+    """The second best explanation in words; None where there is none."""
+    second = blunder.second
+    if second is None:
+        return None
+    decades = (second.log_chance - blunder.best.log_chance) / DECADE
+    return say_second(say_explanation(second, examined.run, examined.tubes), decades, is_doubt=blunder.is_doubt)
 
 
-def toe_shares(k: RigModel, examined: ExaminedHole) -> list[ToeShare]:
-    """What each source gives at the toe, the worst first."""
-    shares = [ToeShare("north", "", 100.0 * north_at_toe(k))]
-    shares += [ToeShare(*examined.share_name(one), 100.0 * std_across(one.variances)) for one in examined.shares]
+@dataclass(frozen=True, slots=True)
+class NamedShare:
+    """What one source, of a tube or joint, gives to the variance (3,) at the toe, m^2."""
+
+    source: str
+    subject: str
+    variances: Array
+
+
+def budget_of_toe(k: RigModel, examined: ExaminedHole) -> list[NamedShare]:
+    """Of what the variance at the toe is made: north, what the looks leave open, depths and the way between stations.
+
+    The last two are those of the trajectory, which are in no look.
+    """
+    shares = [NamedShare(*examined.share_name(one), one.variances) for one in examined.shares]
+    return [
+        NamedShare("north", "", north_at_toe(k)),
+        *shares,
+        NamedShare("depth", "", k.hole.toe_by_depth),
+        NamedShare("legs", "", np.diagonal(k.hole.trajectory.path_covs[-1])),
+    ]
+
+
+def north_at_toe(k: RigModel) -> Array:
+    """Variance (3,), m^2, at the toe by the encoder's zero against north, which is in no look."""
+    north, east, _ = k.hole.trajectory.positions[-1]
+    return np.asarray((np.array([east, north, 0.0]) * min(north_std(k.setup), TURN_MOST)) ** 2)
+
+
+def toe_shares(budget: Sequence[NamedShare]) -> list[ToeShare]:
+    """What each source, tube or joint gives at the toe, the worst first."""
+    shares = [ToeShare(one.source, one.subject, CM * std_across(one.variances)) for one in budget]
     return sorted((one for one in shares if one.sigma_cm > LEAST_SHOWN_CM), key=lambda one: -one.sigma_cm)
+
+
+def toe_parts(budget: Sequence[NamedShare]) -> list[ToePart]:
+    """What all errors of each source give at the toe together, the worst first."""
+    by_source: dict[str, list[NamedShare]] = {}
+    for one in budget:
+        by_source.setdefault(one.source, []).append(one)
+    total = float(sum(one.variances[:LEVEL].sum() for one in budget))
+    parts = [part_of(source, same, total) for source, same in by_source.items()]
+    return sorted((one for one in parts if one.sigma_cm > LEAST_SHOWN_CM), key=lambda one: -one.percent)
+
+
+def part_of(source: str, shares: Sequence[NamedShare], total: float) -> ToePart:
+    """One source; ``total`` is the variance (m^2) of all to north and east."""
+    variances = np.sum([one.variances for one in shares], axis=0)
+    worst = max(shares, key=lambda one: std_across(one.variances)).subject if len(shares) > 1 else ""
+    share = float(variances[:LEVEL].sum()) / total if total > 0.0 else 0.0
+    return ToePart(source, say_part(source, worst), CM * std_across(variances), 100.0 * share)
+
+
+def least_found(examined: ExaminedHole, one: Reliability) -> LeastFound:
+    """From which size on a mistake is found."""
+    unfound = unfound_across(one)
+    return LeastFound(
+        kind=one.hypothesis.kind.value,
+        subject=examined.subject(one.hypothesis),
+        smallest=size_found(one),
+        unit=unit_of(one.hypothesis.kind)[0],
+        unfound_cm=CM * unfound if math.isfinite(unfound) else None,
+        words=say_unfound(one, examined.tubes),
+    )
 
 
 def adjusted_tube(examined: ExaminedHole, place: int) -> AdjustedTube:
     """One tube as all surveys show it."""
     bias = bias_of_tube(examined.adjusted, place)
-    step = next(one for one in examined.steps_found if one.hypothesis.subject == (place,))
-    unfound = std_across(np.square(step.unfound))
+    steps = (one for one in examined.reliabilities if one.hypothesis.kind is STEP)
+    step = next(one for one in steps if one.hypothesis.subject == (place,))
+    unfound = unfound_across(step)
     return AdjustedTube(
         tube=int(examined.tubes[place]),
         bias_mg=(bias.bias / MILLI_G).tolist(),
         sigma_bias_mg=(np.sqrt(np.diag(bias.cov)) / MILLI_G).tolist(),
         looks=bias.looks,
         smallest_step_mg=step.smallest / MILLI_G if math.isfinite(step.smallest) else None,
-        unfound_step_cm=100.0 * unfound if math.isfinite(unfound) else None,
+        unfound_step_cm=CM * unfound if math.isfinite(unfound) else None,
     )
 
 
-def next_stop_advice(examined: ExaminedHole) -> NextStopAdvice | None:
-    """Where to stop next; None while one station alone is known."""
+def next_stop_advice(examined: ExaminedHole, budget: Sequence[NamedShare]) -> NextStopAdvice | None:
+    """Where to stop next; None while one station alone is known. What no look tells stays as it is at the toe."""
     planned = examined.next_stop
     if planned is None:
         return None
+    stays = sum(float(one.variances[:LEVEL].sum()) for one in budget if one.source in IN_NO_LOOK)
+    cm = CM * np.sqrt((planned.toe_stds**2 + stays) / LEVEL)
     same = int(np.argmin(np.abs(planned.angles)))
-    return NextStopAdvice(
-        turn_deg=math.degrees(planned.best),
-        sigma_cm=100.0 * float(planned.toe_stds.min()),
-        same_face_cm=100.0 * float(planned.toe_stds[same]),
-    )
+    numbers = math.degrees(planned.best), float(cm.min()), float(cm[same])
+    return NextStopAdvice(*numbers, say_next_stop(*numbers))

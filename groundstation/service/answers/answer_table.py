@@ -135,9 +135,11 @@ ANSWERS: Final = {
         AnswerKey(
             "adjustment",
             AdjustmentAnswer,
-            "what the tubes say about each other: how well all surveys fit, what is wrong and with what, sensors as "
-            "learnt, of what the sigma at the toe is made, what would be found, the angle of the next stop",
-            published=False,
+            "what the tubes say about each other once the surveys of a stop are there: how well all fit, what is "
+            "wrong and with what, sensors as learnt, of what the sigma at the toe is made, what would be found, the "
+            "angle of the next stop",
+            of_the_hole=True,
+            on_page=True,
         ),
         AnswerKey(
             "column",

@@ -55,9 +55,9 @@ def answer_station(k: RigModel, n: int) -> Station:
 
 
 def station_rows(k: RigModel, numbers: Sequence[int]) -> list[Station]:
-    """Stations of these numbers, fused; those to which nothing has come since they were shown last are as they were.
+    """Stations of these numbers; those to which nothing has come since they were shown last are as they were.
 
-    What a string turns by in a bent hole changes with the stations around.
+    What a string turns by in a bent hole changes with the stations around, an adjusted hole with every stop.
     """
     known, hole = k.hole.stations, k.hole
     chosen, drawn = [known[n - 1] for n in numbers], hole.trajectory

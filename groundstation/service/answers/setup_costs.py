@@ -29,6 +29,7 @@ KIND_OF: Final = {
     "collar": SetupKind.COLLAR,
     "gravity": SetupKind.GRAVITY,
 }  # of the names of shares
+ADJUSTED_KINDS: Final = frozenset(KIND_OF.values())
 
 
 def setup_costs(k: RigModel, items: list[SetupItem], course: Trajectory) -> Mapping[str, float]:
@@ -37,6 +38,8 @@ def setup_costs(k: RigModel, items: list[SetupItem], course: Trajectory) -> Mapp
     examined = k.hole.examined if k.hole.is_adjusted else None
     if examined is not None:
         found: dict[str, Array] = defaultdict(lambda: np.zeros(3))
+        found |= {item.name: np.zeros(3) for item in items if item.kind in ADJUSTED_KINDS}  # also of what read nothing
+        found[SetupKind.PATH.value] = np.diagonal(k.hole.trajectory.path_covs[-1]).copy()
         for name, variances in _shares_by_item(examined, items):
             found[name] += variances
         costs |= {name: std_across(variances) for name, variances in found.items()}

@@ -12,7 +12,7 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.setup_costs import setup_costs
 from groundstation.service.answers.shapes.setup_shapes import SetupAnswer, SetupRow
 from groundstation.service.answers.streamed_rows import Parameters
-from groundstation.service.setup.readiness import next_step
+from groundstation.service.setup.readiness import next_step, say_worst, words_of
 from groundstation.service.setup.setup_items import ALONG, SetupItem, missing_names, setup_items
 from groundstation.service.setup.toe_costs import designed_course
 
@@ -38,6 +38,7 @@ def answer_setup(k: RigModel, _p: Parameters) -> SetupAnswer:
         missing=missing,
         todo=next_step(items, costs),
         worst=max(items, key=lambda item: (item.kind not in ALONG, costs[item.name])).name,
+        costs_most=say_worst(items, costs),
         at_m=round(float(course.md[-1]), 3),
         surveyed=is_surveyed,
         left_out=LEFT_OUT,
@@ -52,6 +53,7 @@ def setup_row(item: SetupItem, costs: Mapping[str, float], now: float) -> SetupR
         item=item.name,
         kind=item.kind.value,
         subject=item.subject,
+        words=words_of(item),
         value=[round(scale * value, 9) for value in item.values],
         sigma=float(f"{scale * item.sigma:.6g}"),
         unit=SHOWN_UNITS.get(item.unit, item.unit),

@@ -9,10 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.blunder_cost import BlunderCost, cost_blunders
 from groundstation.survey.adjustment.blunder_words import say_blunder
 from groundstation.survey.adjustment.blunders import Blunder, Examination, chance_of_one
 from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, prior_shares, toe_budget
 from groundstation.survey.adjustment.hypotheses import BlunderKind, Hypothesis
+from groundstation.survey.adjustment.least_found import LARGEST, possible_mistakes
 from groundstation.survey.adjustment.next_stop import NextStop, plan_stop
 from groundstation.survey.adjustment.reliability import Reliability, measure_reliability
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
@@ -22,12 +24,10 @@ from groundstation.survey.fusion.shared import KINDS
 Array = npt.NDArray[np.float64]
 LEVEL = 2  # of north, east and down those across a hole
 OF_TUBE = (ShareSource.BIAS, ShareSource.TILT)
-LARGEST_STEP = 0.2  # m/s^2, by which an accelerometer that was knocked may step: 20 mg
 SOURCE_NAMES = {
     ShareSource.BIAS: "accelerometer_bias", ShareSource.TILT: "mounts", ShareSource.COLLAR: "collar",
     ShareSource.PATH: "path",
 }  # fmt: skip
-STEP = BlunderKind.BIAS_STEPPED
 UNEVEN = (BlunderKind.ENCODER_DRIFTS,)  # whose size is one for all stops, and not quite so
 UNEXPLAINED = "the newest surveys contradict those before; what is wrong is being looked for"
 UNSOLVED = (
@@ -111,7 +111,7 @@ class ExaminedHole:
             if share.source is ShareSource.TURN:
                 name = KINDS.get(self.share_name(share)[0], "joints")
             if name is not None:
-                found[name] = found.get(name, 0.0) + share.variances.reshape(-1, 3)
+                found[name] = found.get(name, 0.0) + np.maximum(share.variances, 0.0).reshape(-1, 3)
         return found
 
     @cached_property
@@ -121,15 +121,16 @@ class ExaminedHole:
         return plan_stop(self.adjusted, float(md[-1] - md[-2])) if len(md) > LEVEL else None
 
     @cached_property
-    def steps_found(self) -> list[Reliability]:
-        """How well a step of each accelerometer at its newest stop would be found."""
-        looks = self.adjusted.looks
-        newest = {int(tube): int(stop) for tube, stop in zip(looks.tube, looks.stop, strict=True)}
-        steps = [Hypothesis(STEP, (tube,), stop) for tube, stop in newest.items()]
-        chance = chance_of_one(looks, self.run)
-        return measure_reliability(
-            self.adjusted, self.run, steps, toe_weights(self.adjusted), {STEP: LARGEST_STEP}, chance
-        )
+    def costs(self) -> list[BlunderCost | None]:
+        """What each blunder costs at the toe."""
+        return cost_blunders(self.examination)
+
+    @cached_property
+    def reliabilities(self) -> list[Reliability]:
+        """How well what may go wrong with each tube at its newest stop, and with the string, would be found."""
+        found, run = self.adjusted, self.run
+        possible, chance = possible_mistakes(found.looks, run), chance_of_one(found.looks, run)
+        return measure_reliability(found, run, possible, toe_weights(found), LARGEST, chance)
 
 
 def std_across(variances: Array) -> float:

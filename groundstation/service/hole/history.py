@@ -98,12 +98,13 @@ class History:
             return False
         return epoch > newest_epoch or (epoch == newest_epoch and at > newest_at + SAME_STOP)
 
-    def take_over(self) -> Moment | None:
-        """Add what was kept of the stop that ends now; None where nothing was."""
+    def take_over(self, surveys: int) -> Moment | None:
+        """Add what was kept of the stop that ends now, with so many surveys; None where nothing was."""
         moment = self._kept.get(self.count + 1)
         if moment is None or moment.at != self._newest[1]:
             return None
         self.count += 1
+        self._note_worth(surveys)
         self._append(replace(moment, where=self._kept_once(moment.where)))
         return self.moments[-1]
 
@@ -113,9 +114,12 @@ class History:
             return False  # it was passed over before
         is_due = self._looked_at <= LOOKED_AT_ALL or surveys >= self._next
         if is_due:
-            self._looked_at += surveys
-            self._next = math.ceil(SPARSER * surveys)
+            self._note_worth(surveys)
         return is_due
+
+    def _note_worth(self, surveys: int) -> None:
+        self._looked_at += surveys
+        self._next = math.ceil(SPARSER * surveys)
 
     def pass_over(self) -> None:
         """A stop has ended of which nothing is kept."""

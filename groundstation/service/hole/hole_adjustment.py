@@ -99,12 +99,14 @@ class HoleAdjustment:
         numbers, which = number_values(seen["chain"])
         chains, hanging = [self._shared.chain(number) for number in numbers], Hanging()
         hung = np.array([hanging.add_chain(chain) for chain in chains], np.intp)[which]
-        newest = dict(zip(which.tolist(), seen["systematic_var"].tolist(), strict=True))
-        variances = [newest[place] for place in range(len(chains))]
+        systematic = seen["systematic_var"]
+        least = np.full(len(chains), math.inf)
+        np.minimum.at(least, which, systematic)
         mount_var = math.radians(self._config.mount_std_deg) ** 2
-        causes = causes_of_turns(hanging, chains, variances, mount_var)
+        causes = causes_of_turns(hanging, chains, least.tolist(), mount_var)
         tube_of, make_up = np.ascontiguousarray(hung[:, 0]), np.ascontiguousarray(hung[:, 1])
-        unknown = UNKNOWN_YAW_VAR * (seen["trust"] == Trust.UNKNOWN_YAW)
+        # what a node doubts beyond its mount and joints, as after a slip, is of that look
+        unknown = UNKNOWN_YAW_VAR * (seen["trust"] == Trust.UNKNOWN_YAW) + (systematic - least[which])
         stop, force = stop_numbers(seen["at"]), np.ascontiguousarray(forces)
         noise, yaw = noise_of(seen, tube_of), seen["yaw"].copy()
         looks = Looks(station, tube_of, make_up, stop, force, noise, yaw, seen["yaw_var"] + unknown)

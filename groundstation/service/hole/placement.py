@@ -10,6 +10,7 @@ from groundstation.service.hole.resolving import Found, Resolver
 from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.service.setup.setup_book import SetupBook
 from groundstation.service.setup.setup_correction import corrected_measurement, depth_shift
+from groundstation.service.setup.setup_items import accelerometer_std
 from groundstation.service.string.known_string import KnownString
 from groundstation.service.string.stored import Stored
 from groundstation.survey.fusion.shared import SharedErrors
@@ -43,10 +44,9 @@ class Placement:
         self, config: GroundConfig, string: KnownString, hole: SurveyedHole, shared: SharedErrors, setup: SetupBook
     ) -> None:
         mount_var = math.radians(config.mount_std_deg) ** 2
-        bias_std = math.radians(config.accelerometer_bias_std_deg) * config.gravity
         self._string, self._hole, self._setup = string, hole, setup
         self._tube_length = config.tube_length
-        self._resolver = Resolver(config.gravity, shared, mount_var, bias_std)
+        self._resolver = Resolver(config.gravity, shared, mount_var, accelerometer_std(config))
         self.waiting: list[Waiting] = []
         self.set_aside: list[SurveyMeasurement] = []
         self.refused = 0

@@ -206,6 +206,10 @@ class SurveyStation:
         """Keep what a view shows of the stops that count."""
         self._shown = self._made_of, view
 
+    def forget_view(self) -> None:
+        """Its direction is another one, although no stop has come to it."""
+        self._shown = None
+
     def fused(self, weighting: Weighting) -> Direction:
         """Direction from the stops that count; worked out anew where another has come."""
         made_of = self._made_of

@@ -18,14 +18,13 @@ from itertools import pairwise
 import numpy as np
 
 from groundstation.config import GroundConfig
-from groundstation.service.setup.setup_items import MOUNT_TILT_STD
+from groundstation.service.setup.setup_items import GRAVITY_STD, accelerometer_std, mount_tilt_std
 from groundstation.survey.adjustment.looks import StringPrior
 from groundstation.survey.adjustment.run_of_stops import JOINT, MOUNT, TurnCauses
 
 Chain = tuple[int, tuple[int, ...] | None]  # a tube, and those above it, lowest first, where their order is known
 Joint = tuple[int, ...]
 Hung = tuple[int, int]  # a tube in the string as it was hung at first, or once it was hung otherwise
-GRAVITY_STD = 2e-3  # m/s^2, of what is entered for the site
 LEAST_VAR = 1e-10  # rad^2, of a turn: marks are not read finer
 LEAST_STD = 1e-7  # rad and m/s^2, of what is stated as known
 DRIVE = 0  # above the topmost tube
@@ -83,13 +82,10 @@ class Hanging:
 
 def prior_of_string(config: GroundConfig, count: int, causes: TurnCauses) -> StringPrior:
     """Prior of so many tubes, whose turns have these causes."""
-    bias = math.radians(config.accelerometer_bias_std_deg) * config.gravity
-    told = config.mount_tilt_std_deg
-    tilt = MOUNT_TILT_STD if told is None else math.radians(told)
     cov = causes.cov
     return StringPrior(
-        np.full(count, max(bias, LEAST_STD)),
-        np.full(count, max(tilt, LEAST_STD)),
+        np.full(count, max(accelerometer_std(config), LEAST_STD)),
+        np.full(count, max(mount_tilt_std(config), LEAST_STD)),
         np.zeros(len(cov)),
         cov + LEAST_VAR * np.eye(len(cov)),
         config.gravity,

@@ -24,9 +24,10 @@ from groundstation.service.hole.hole_adjustment import HoleAdjustment, direction
 from groundstation.service.hole.movement import Moved, Movement, moved_stations
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
-from groundstation.service.hole.told_depths import depths_at_make_ups, told_depth_errors
+from groundstation.service.hole.told_depths import depths_at_make_ups
 from groundstation.service.setup.setup_book import SetupBook
-from groundstation.service.setup.setup_priors import collar_direction, north_std
+from groundstation.service.setup.setup_priors import collar_direction, depth_errors, length_stds, north_std
+from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
@@ -76,7 +77,7 @@ class SurveyedHole:
         self.version += 1
         self._is_behind = True
         self._collar = collar_direction(self._config, self._setup)
-        self._depth_errors = told_depth_errors(self._config, self._setup)
+        self._depth_errors = depth_errors(self._config, self._setup)
         self._misfit: tuple[int, float, str] = (0, 0.0, "")  # of depths, by version and since when
         self._stops = ResolvedStops()
         self._station_of: list[SurveyStation] = []  # of each of its rows
@@ -158,7 +159,7 @@ class SurveyedHole:
         history = self._history
         if not (self._is_adjusted and self._is_behind):
             history.add(self.deviations, self.projection)
-        elif (kept := history.take_over()) is not None:
+        elif (kept := history.take_over(len(self._stops))) is not None:
             if len(kept.where) > 1:
                 self._alarms.judge_deviation(kept.worst(first=1), kept.at)
             if (end := kept.projection) is not None:
@@ -295,6 +296,14 @@ class SurveyedHole:
         rest = np.diagonal(drawn.covs, axis1=1, axis2=2) - sum(found.values())
         return {"random": np.maximum(rest, 0.0)} | found
 
+    @property
+    def toe_by_depth(self) -> Array:
+        """Variance (3,), m^2, of the last position by what is not known of depths."""
+        drawn = self.trajectory
+        *_, columns = drawn.columns()
+        shared = self._shared.variances(columns)[-1, KIND_NAMES.index("depth")]
+        return np.asarray(shared + np.diagonal(drawn.depth_covs[-1]))
+
     def _variances_of_directions(self, drawn: Trajectory) -> dict[str, Array]:
         """Variances (n, 3), m^2, along a trajectory by what directions have in common."""
         shared = np.concatenate([self._shared.variances(columns) for columns in drawn.columns()])
@@ -330,6 +339,8 @@ class SurveyedHole:
     def _adjust(self) -> list[SurveyStation]:
         """Adjust the hole; all of its stations have changed, and so has the direction from which it is drawn."""
         self._touched, examined, below = {}, self.examined, self._below
+        for station in self._stations:
+            station.forget_view()
         if examined is None:
             self._stand_alone(below)
             return below
@@ -337,10 +348,7 @@ class SurveyedHole:
         self._adjusted = dict(zip([one.md for one in below], found, strict=True))
         self._adjusted_collar = at_collar
         self._trajectory = self._drawn_from(at_collar)
-        now = examined.adjusted.now
-        driven = now.leg_vars / now.curvature_var
-        driven[:-1] = np.maximum(driven[:-1], driven[1:])  # what bends sharply may have begun above the station
-        self._trajectory.bend_as(LegWander(math.sqrt(now.curvature_var), self._config.curvature_length), driven)
+        self._bend_as(examined.adjusted)
         self._moved = moved_stations(examined, below)
         self._surveyed_back = self._points_back(below)
         return below
@@ -356,6 +364,13 @@ class SurveyedHole:
         tangents = tangents_of([self._collar, *(one.fused(Weighting.BAYES) for one in below)])
         back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
         return [below[place].md for place in back.tolist()]
+
+    def _bend_as(self, found: Adjusted) -> None:
+        """Have what lies between stations follow the curvature that the adjustment has learnt."""
+        wander = LegWander(math.sqrt(found.now.curvature_var), self._config.curvature_length)
+        driven = found.now.leg_vars / found.now.curvature_var
+        driven[:-1] = np.maximum(driven[:-1], driven[1:])  # what bends sharply may have begun above the station
+        self._trajectory.bend_as(wander, driven)
 
     def _fuse(self, since: float) -> list[SurveyStation]:
         """Fuse the stations of which something may have changed since a time (s), together those with one more stop."""
@@ -385,9 +400,11 @@ class SurveyedHole:
         depths, places_of = {}, self._stops.depth_places.__getitem__
         # how depths scatter is another thing at every stop, and is taken in where all stations are worked out anew
         errors = self._errors_of_depths() if self._is_adjusted else self._depth_errors
+        stds = length_stds(self._setup)
+        told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()}
         for one in changed:
             places = [*map(places_of, one.stops.rows)]
-            depths[one.md] = mean_depth(one.md, places, errors, self._config.tube_length)
+            depths[one.md] = mean_depth(one.md, places, errors, self._config.tube_length, told)
         self._trajectory.put(self._directions(changed), depths)
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)

@@ -1,4 +1,4 @@
-"""How well the depths of a hole are known by what was told of the rig, and what the make-ups say of them. No I/O."""
+"""What the make-ups of a string say of the depths of its hole. No I/O."""
 
 from __future__ import annotations
 
@@ -8,23 +8,12 @@ import numpy.typing as npt
 from groundstation.config import GroundConfig
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.setup.setup_book import SetupBook
-from groundstation.service.setup.setup_items import STICK_UP_STD
-from groundstation.service.setup.told_value import SetupKind
 from groundstation.survey.fusion.shared import SharedErrors
-from groundstation.survey.well.depth_errors import OF_ALL, DepthErrors
+from groundstation.survey.well.depth_errors import OF_ALL
 from groundstation.survey.well.make_up_depths import MakeUpDepths, make_up_depths
 
 Array = npt.NDArray[np.float64]
 NOTHING = MakeUpDepths(np.zeros(0, np.intp), np.zeros(0), np.zeros(0))
-
-
-def told_depth_errors(config: GroundConfig, book: SetupBook) -> DepthErrors:
-    """Errors of measured depths: those of a stick-up and of lengths as they were told, wide where none was."""
-    usual = config.depth_errors
-    told = book.standing(SetupKind.STICK_UP)
-    offset = max(usual.offset_std, STICK_UP_STD) if told is None else told.sigma
-    lengths = max([usual.tube_std, *(length.sigma for length in book.lengths.values())])
-    return DepthErrors(usual.scale_std, offset, lengths, usual.reading_std)
 
 
 def depths_at_make_ups(

@@ -17,7 +17,8 @@ from groundstation.service.hole.resolving import Found
 from groundstation.service.string.stored import Stored
 from telemetry.messages import Event, Kept, StaticRecord, SurveyMeasurement
 
-CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column", "setup")
+CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column")
+ONCE_RESTED = ("adjustment", "setup")  # what all surveys say of each thing, which takes long to work out
 RESTORED_TOGETHER = 256  # messages
 
 
@@ -42,6 +43,8 @@ class Learner:
         self._arrived: list[Stored[Kept]] = []  # since the last transaction
         # alarms of the hole, moves and stops of the string that were told
         self._known: tuple[list[DeviationAlarm], int, int] = ([], 0, 0)
+        # versions of the hole at the last look, and as its adjustment was published
+        self._rested = self._shown = model.hole.version
         self._by_survey = CHANGED_BY_SURVEY if model.wall is None else (*CHANGED_BY_SURVEY, "wall")
 
     def take(self, message: Kept) -> None:
@@ -120,9 +123,21 @@ class Learner:
         is_explained = hole.adopt_found()
         before, self._known = self._known, (list(hole.alarms.alarms), len(hole.moved), hole.history.count)
         self._moments.keep()
-        paths = {"alarms": before[:2] != self._known[:2], "history": before[2] != self._known[2]}
+        paths = {
+            "alarms": before[:2] != self._known[:2],
+            "history": before[2] != self._known[2],
+            **dict.fromkeys(ONCE_RESTED, self._has_rested()),
+        }
         changed = [path for path, has_changed in paths.items() if has_changed]
         return sorted({*changed, *self._by_survey, "alarms"}) if is_explained else changed
+
+    def _has_rested(self) -> bool:
+        """Whether no survey has come since the last look, and some before."""
+        before, self._rested = self._rested, self._hole.version
+        if not before == self._rested != self._shown:
+            return False
+        self._shown = self._rested
+        return True
 
     def restore(self) -> None:
         """Go on with everything that was stored, some hundred messages at a time."""
@@ -162,7 +177,7 @@ class Learner:
         self._followed = version
         self._hole.catch_up()
         self.find_consequences()
-        return sorted({*self._by_survey, "alarms", "history", "verdict", "status"})
+        return sorted({*self._by_survey, "setup", "alarms", "history", "verdict", "status"})
 
     def _restore_messages(self) -> None:
         """Learn everything that was stored."""

@@ -8,7 +8,15 @@ from groundstation.service.setup.setup_items import ALONG, SetupItem, missing_na
 from groundstation.service.setup.told_value import SetupKind
 
 MOST_NAMED = 3  # joints in a line of the verdict
+LEAST_TOLD = 0.001  # m at the toe, below which no cost is worth a word
 WORTH_TELLING = 0.005  # m at the toe, from which on what was not told is the next thing to tell
+WORDS = {
+    SetupKind.STICK_UP: "stick-up",
+    SetupKind.MOUNT: "tilt of the mount",
+    SetupKind.MOUNT_TURN: "turn of the mount",
+    SetupKind.PLAY: "tubes askew in the hole",
+    SetupKind.PATH: "bends of the hole",
+}  # of the other kinds their own name
 ORDERS = {
     SetupKind.NORTH: "tell north: cmd/north?action=tell;angle_deg=..;sigma_deg=..",
     SetupKind.COLLAR: "tell the collar: cmd/collar?action=tell;inclination_deg=..;azimuth_deg=..;sigma_deg=..",
@@ -27,6 +35,23 @@ def told_briefly(names: Sequence[str]) -> str:
         return ", ".join(others)
     more = f" and {len(joints) - MOST_NAMED} more" if len(joints) > MOST_NAMED else ""
     return ", ".join([*others, f"joint{'s' if len(joints) > 1 else ''} {', '.join(joints[:MOST_NAMED])}{more}"])
+
+
+def words_of(item: SetupItem) -> str:
+    """Name of an item for people: ``accelerometer of tube 3``."""
+    words = WORDS.get(item.kind, item.kind.value.replace("_", " "))
+    if item.kind is SetupKind.JOINT:
+        return f"{words} {item.subject}"
+    return f"{words} of tube {item.subject}" if item.subject else words
+
+
+def say_worst(items: Sequence[SetupItem], costs: Mapping[str, float]) -> str:
+    """Which item costs most at the toe, across the hole, and how much."""
+    worst = max(items, key=lambda item: (item.kind not in ALONG, costs.get(item.name, 0.0)))
+    cm = 100.0 * costs.get(worst.name, 0.0)
+    if cm < 100.0 * LEAST_TOLD and not worst.is_missing:
+        return "no item costs as much as a millimetre"
+    return f"{words_of(worst)}, {cm:.1f} cm"
 
 
 def next_step(items: Sequence[SetupItem], costs: Mapping[str, float]) -> str:

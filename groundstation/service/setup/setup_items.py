@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from groundstation.config import GroundConfig
+from groundstation.config import SENSOR_BIAS_DEG, GroundConfig
 from groundstation.service.setup.setup_book import Pair, SetupBook
 from groundstation.service.setup.told_value import CONFIGURATION, DRIVE, SetupKind, ToldValue, item_name, joint_subject
 from groundstation.service.string.known_string import KnownString
@@ -22,11 +22,10 @@ DEG = math.radians(1.0)
 COLLAR_STD = 1.0 * DEG  # each way, of a rig that is set up by eye and level
 MOUNT_TILT_STD = 0.5 * DEG  # of an IMU as it is mounted in its tube, until an alignment has found it
 JOINT_STD = 0.05 * DEG  # of a scribe mark that a node was told; the ground station does not hear its own
-LENGTH_STD = 5e-3  # m, of a tube as it is made
-STICK_UP_STD = 0.1  # m
-DEPTH_SCALE_STD, DEPTH_OFFSET_STD = 1e-3, 0.05  # 1 and m, of the block's position
-GRAVITY_STD = 0.02  # m/s^2, of the Earth's, where the site's is not measured
-ALONG = (SetupKind.LENGTH, SetupKind.STICK_UP, SetupKind.DEPTH_SCALE, SetupKind.DEPTH_OFFSET)  # errors of the depth
+STICK_UP_STD = 0.1  # m, until it is told
+GRAVITY_STD = 2e-3  # m/s^2, of what is entered for the site
+ALONG = (SetupKind.LENGTH, SetupKind.STICK_UP, SetupKind.DEPTH_SCALE)  # errors of the depth
+BARE = "bare sensor"
 GYROSCOPE_BIAS_STD = 0.02 * DEG  # rad/s; a node measures its own at rest
 
 
@@ -104,7 +103,7 @@ def _items_of_rig(config: GroundConfig, book: SetupBook) -> Iterator[SetupItem]:
     for kind, unit, needed, values, sigma, source, detail in (
         (SetupKind.NORTH, "rad", True, (), UNKNOWN_YAW_STD, SetupSource.DEFAULT, "not told: any azimuth may be"),
         (SetupKind.COLLAR, "rad", False, design, COLLAR_STD, SetupSource.DESIGN, "not told: as the design"),
-        (SetupKind.STICK_UP, "m", False, (0.0,), STICK_UP_STD, SetupSource.DEFAULT, "not told"),
+        (SetupKind.STICK_UP, "m", False, (0.0,), untold_stick_up_std(config), SetupSource.DEFAULT, "not told"),
     ):
         told = book.standing(kind)
         if told is None:
@@ -115,8 +114,7 @@ def _items_of_rig(config: GroundConfig, book: SetupBook) -> Iterator[SetupItem]:
             yield _told_item(told, unit, book, is_needed=needed)
     default, rules = SetupSource.DEFAULT, ("not told", "until the residuals of the hole show it")
     for kind, values, sigma, unit, detail in (
-        (SetupKind.DEPTH_SCALE, (1.0,), DEPTH_SCALE_STD, "1", rules[0]),
-        (SetupKind.DEPTH_OFFSET, (0.0,), DEPTH_OFFSET_STD, "m", rules[0]),
+        (SetupKind.DEPTH_SCALE, (1.0,), config.depth_scale_std, "1", rules[0]),
         (SetupKind.PLAY, (0.0,), math.radians(config.play_std_deg), "rad", rules[1]),
         (SetupKind.PATH, (0.0,), math.radians(config.curvature_std_deg_per_m), "rad/m", rules[1]),
         (SetupKind.GRAVITY, (config.gravity,), GRAVITY_STD, "m/s^2", CONFIGURATION),
@@ -150,16 +148,18 @@ def _items_of_tubes(config: GroundConfig, book: SetupBook, string: KnownString) 
     for tube in string.tubes:
         yield _length_item(config, book, tube)
         yield _mount_item(config, string, tube)
-        turn, bias = math.radians(config.mount_std_deg), math.radians(config.accelerometer_bias_std_deg)
         subject, design = str(tube), SetupSource.DESIGN
-        yield SetupItem(SetupKind.MOUNT_TURN, subject, (0.0,), turn, "rad", design, CONFIGURATION)
+        yield SetupItem(
+            SetupKind.MOUNT_TURN, subject, (0.0,), math.radians(config.mount_std_deg), "rad", design, CONFIGURATION
+        )
         state = string.states.newest.get(tube)
         block = "" if state is None or not state.parameters_version else f"block {state.parameters_version}"
-        source = SetupSource.MEASURED if block else design
-        detail = block or "bare sensor"
-        force = bias * config.gravity
-        yield SetupItem(SetupKind.ACCELEROMETER, subject, (0.0,), force, "m/s^2", source, detail)
-        yield SetupItem(SetupKind.GYROSCOPE, subject, (0.0,), GYROSCOPE_BIAS_STD, "rad/s", source, detail)
+        source, detail = (SetupSource.MEASURED, block) if block else (design, BARE)
+        gyroscope = SetupItem(SetupKind.GYROSCOPE, subject, (0.0,), GYROSCOPE_BIAS_STD, "rad/s", source, detail)
+        if not block and config.accelerometer_bias_std_deg != SENSOR_BIAS_DEG:
+            source, detail = SetupSource.TOLD, CONFIGURATION
+        yield SetupItem(SetupKind.ACCELEROMETER, subject, (0.0,), accelerometer_std(config), "m/s^2", source, detail)
+        yield gyroscope
 
 
 def _length_item(config: GroundConfig, book: SetupBook, tube: int) -> SetupItem:
@@ -167,7 +167,7 @@ def _length_item(config: GroundConfig, book: SetupBook, tube: int) -> SetupItem:
         return _told_item(told, "m", book)
     values = (config.tube_length,)
     return SetupItem(
-        SetupKind.LENGTH, str(tube), values, LENGTH_STD, "m", SetupSource.DESIGN, "as it is made",
+        SetupKind.LENGTH, str(tube), values, config.tube_length_std, "m", SetupSource.DESIGN, "as it is made",
         times_told=book.told_before(item_name(SetupKind.LENGTH, tube)),
     )  # fmt: skip
 
@@ -179,11 +179,27 @@ def _mount_item(config: GroundConfig, string: KnownString, tube: int) -> SetupIt
         return SetupItem(
             kind, subject, state.alignment[:2], std, "rad", SetupSource.MEASURED, "aligned by turning the string"
         )
+    std = mount_tilt_std(config)
     if config.mount_tilt_std_deg is not None:
-        std = math.radians(config.mount_tilt_std_deg)
         return SetupItem(kind, subject, (0.0, 0.0), std, "rad", SetupSource.TOLD, CONFIGURATION, CONFIGURATION)
     detail = "not aligned: as it is mounted"
-    return SetupItem(kind, subject, (0.0, 0.0), MOUNT_TILT_STD, "rad", SetupSource.DESIGN, detail)
+    return SetupItem(kind, subject, (0.0, 0.0), std, "rad", SetupSource.DESIGN, detail)
+
+
+def untold_stick_up_std(config: GroundConfig) -> float:
+    """Standard deviation (m) of a stick-up that was not told."""
+    return max(config.depth_offset_std, STICK_UP_STD)
+
+
+def accelerometer_std(config: GroundConfig) -> float:
+    """Standard deviation (m/s^2) of the bias of an accelerometer on each axis."""
+    return math.radians(config.accelerometer_bias_std_deg) * config.gravity
+
+
+def mount_tilt_std(config: GroundConfig) -> float:
+    """Standard deviation (rad) of the tilt of a mount that was not aligned, each way."""
+    told = config.mount_tilt_std_deg
+    return MOUNT_TILT_STD if told is None else math.radians(told)
 
 
 def _told_item(told: ToldValue, unit: str, book: SetupBook, *, is_needed: bool = False) -> SetupItem:

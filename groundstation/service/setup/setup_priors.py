@@ -10,9 +10,10 @@ import numpy as np
 
 from groundstation.config import GroundConfig
 from groundstation.service.setup.setup_book import SetupBook
-from groundstation.service.setup.setup_items import COLLAR_STD, SetupItem
+from groundstation.service.setup.setup_items import COLLAR_STD, SetupItem, untold_stick_up_std
 from groundstation.service.setup.told_value import SetupKind
 from groundstation.survey.fusion.resolve import Direction, known_direction
+from groundstation.survey.well.depth_errors import DepthErrors
 from telemetry.messages import UNKNOWN_YAW_STD
 
 
@@ -60,6 +61,17 @@ def collar_direction(config: GroundConfig, book: SetupBook) -> Direction:
         return uncertain_direction(config.design.inclination, config.design.azimuth, COLLAR_STD)
     inclination, azimuth = told.values
     return uncertain_direction(inclination, azimuth, told.sigma)
+
+
+def depth_errors(config: GroundConfig, book: SetupBook) -> DepthErrors:
+    """Errors of measured depths but for those of lengths that were told; of a stick-up wide where none was."""
+    usual, told = config.depth_errors, book.standing(SetupKind.STICK_UP)
+    return replace(usual, offset_std=untold_stick_up_std(config) if told is None else told.sigma)
+
+
+def length_stds(book: SetupBook) -> Mapping[int, float]:
+    """Standard deviations (m) of the lengths that were told, by tube."""
+    return {tube: told.sigma for tube, told in book.lengths.items()}
 
 
 def uncertain_direction(inclination: float, azimuth: float, std: float) -> Direction:

@@ -109,7 +109,6 @@ COSTS: Final[dict[SetupKind, Callable[[float, ToeCourse], float]]] = {
     SetupKind.ACCELEROMETER: lambda sigma, course: sigma / GRAVITY * course.length / course.tubes,
     SetupKind.LENGTH: lambda sigma, _course: sigma,
     SetupKind.STICK_UP: lambda sigma, _course: sigma,
-    SetupKind.DEPTH_OFFSET: lambda sigma, _course: sigma,
     SetupKind.DEPTH_SCALE: lambda sigma, course: sigma * course.length,
     SetupKind.PLAY: lambda sigma, course: sigma * course.length / math.sqrt(course.legs * course.tubes),
     SetupKind.PATH: lambda sigma, course: sigma * course.longest_leg**2 / 8.0 * math.sqrt(course.legs),

@@ -27,7 +27,6 @@ class SetupKind(enum.StrEnum):
     MOUNT = "mount"
     MOUNT_TURN = "mount_turn"
     DEPTH_SCALE = "depth_scale"
-    DEPTH_OFFSET = "depth_offset"
     ACCELEROMETER = "accelerometer"
     GYROSCOPE = "gyroscope"
     PLAY = "play"

@@ -102,7 +102,12 @@ class Adjusted:
     def columns(self) -> Array:
         """Change of every state (s + 1, 4, p) for one standard deviation of independent errors in common."""
         flat = self.by_common.reshape(-1, len(self.common_cov))
-        return np.asarray((flat @ np.linalg.cholesky(self.common_cov)).reshape(self.by_common.shape))
+        return np.asarray((flat @ self.common_root).reshape(self.by_common.shape))
+
+    @cached_property
+    def common_root(self) -> Array:
+        """Lower triangular root (p, p) of that covariance."""
+        return np.asarray(np.linalg.cholesky(self.common_cov))
 
     @cached_property
     def covs(self) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.blunders import Blunder, Explanation
-from groundstation.survey.adjustment.hypotheses import BY_DEPTH, OF_FORCE, BlunderKind
+from groundstation.survey.adjustment.hypotheses import BY_DEPTH, OF_FORCE, BlunderKind, Hypothesis
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 
 Array = npt.NDArray[np.float64]
@@ -36,6 +36,48 @@ SENTENCES: Mapping[BlunderKind, str] = {
     K.LOOK_WRONG: "reading of tube {tube} at the stop at {depth} is off by {size}",
     K.COLLAR_WRONG: "direction at the collar is off by {size}, more than was told of it or of north",
 }
+
+AGAIN = "survey again, the string turned to another angle: the readings do not tell which of the two it is"
+ADVICE: Mapping[BlunderKind, str] = {
+    **dict.fromkeys(
+        (K.BIAS_STEPPED, K.BIAS_CREEPS, K.BIAS_WRONG),
+        "go on, it is put right; calibrate tube {tube} or change it when it is out",
+    ),
+    **dict.fromkeys((K.TILT_SLIPPED, K.TILT_WRONG), "go on, it is put right; align tube {tube} by slow turns"),
+    **dict.fromkeys((K.MOUNT_TURNED, K.MOUNT_MISREAD), "go on, it is put right; look at the mount of tube {tube}"),
+    **dict.fromkeys((K.JOINT_SLIPPED, K.JOINT_MISREAD), "read the mark above tube {tube} again and tell that joint"),
+    K.ENCODER_SLIPPED: "look at belt and counter of the encoder, and tell north again",
+    K.HOLE_MOVED: "survey again: what was read there before counts as of then",
+    K.DEPTH_WRONG_ONCE: "go on, it is put right; measure the depth by hand at the next stop",
+    K.DEPTH_WRONG_FROM: "measure the depth by hand, and put its source right",
+    K.AXES_EXCHANGED: "go on, it is put right; look at the sensor of tube {tube} when it is out",
+    K.TUBES_EXCHANGED: "look which of tubes {tube} and {other} hangs where",
+    K.LOOK_WRONG: "go on, it is put right; survey again with tube {tube}",
+}
+
+
+MISTAKES: Mapping[BlunderKind, str] = {
+    K.BIAS_STEPPED: "a step of the accelerometer of tube {tube}",
+    K.TILT_SLIPPED: "a mount of tube {tube} that tilts",
+    K.MOUNT_TURNED: "a mount of tube {tube} that turns",
+    K.JOINT_SLIPPED: "a slip of the joint above tube {tube}",
+    K.ENCODER_SLIPPED: "a slip of the encoder",
+    K.DEPTH_WRONG_ONCE: "a wrong depth at this stop",
+}
+
+
+def name_mistake(one: Hypothesis, tubes: Sequence[str]) -> str:
+    """What may go wrong at a stop, for a crew."""
+    return MISTAKES[one.kind].format(tube=tubes[one.subject[0]] if one.subject else "")
+
+
+def advise_crew(blunder: Blunder, tubes: Sequence[str]) -> str:
+    """What is to be done about a blunder."""
+    if blunder.is_doubt:
+        return AGAIN
+    one = blunder.best.hypothesis
+    words = {"tube": tubes[one.subject[0]], "other": tubes[one.subject[-1]]} if one.subject else {}
+    return ADVICE[one.kind].format(**words)
 
 
 def say_blunder(blunder: Blunder, run: RunOfStops, tubes: Sequence[str]) -> str:

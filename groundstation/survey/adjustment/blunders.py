@@ -39,10 +39,8 @@ MOST_TRIED = 8
 AS_GOOD = 0.3  # part of the best's logarithm that is worth trying; play hides the rest
 PARTED = math.log(100.0)  # by how much the best outdoes the second, or it is a doubt
 MOST_BLUNDERS = 4
+TUBES_MISCOUNTED = 1.5  # spacings of stations by which a depth may be off: one tube too many, and a little
 COLLAR = Hypothesis(BlunderKind.COLLAR_WRONG, ())
-TUBES_MISCOUNTED = (
-    1.5  # spacings of the stations by which a depth may be off: a tube too many, and what it is off beside
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +104,11 @@ class Examination:
     adjusted: Adjusted
     blunders: tuple[Blunder, ...] = ()
     suspicion: Blunder | None = None
+
+    @property
+    def taken_in(self) -> tuple[Hypothesis, ...]:
+        """What the adjustment has as further unknowns or put right in its looks, in its order."""
+        return _taken_in([*self.blunders, *filter(None, [self.suspicion])])
 
     @property
     def global_ratio(self) -> float:
@@ -238,6 +241,12 @@ def find_blunder(
     return Blunder(best, second, global_ratio(found), global_ratio(with_best.found))
 
 
+def is_plausible(one: Hypothesis, size: Array, run: RunOfStops) -> bool:
+    """Whether a blunder of a size can be: a depth is off by a tube that was not counted, never by half of the hole."""
+    spacing = float(np.max(np.diff(run.station_md), initial=0.0))
+    return one.kind not in BY_DEPTH or abs(float(size[0])) <= TUBES_MISCOUNTED * spacing
+
+
 def _score_of_collar(found: Adjusted, known: tuple[Hypothesis, ...]) -> list[Score]:
     """How well it explains what is left that the collar was told wrong; nothing where that is taken in."""
     if COLLAR in known:
@@ -245,12 +254,6 @@ def _score_of_collar(found: Adjusted, known: tuple[Hypothesis, ...]) -> list[Sco
     off = collar_departure(found)
     free = np.asarray(np.linalg.pinv(off.cov), np.float64)[None]
     return [Score((COLLAR,), off.size[None], free, np.array([off.told], np.intp), np.array([off.squares]))]
-
-
-def is_plausible(one: Hypothesis, size: Array, run: RunOfStops) -> bool:
-    """Whether a blunder of a size can be: a depth is off by a tube that was not counted, never by half of the hole."""
-    spacing = float(np.max(np.diff(run.station_md), initial=0.0))
-    return one.kind not in BY_DEPTH or abs(float(size[0])) <= TUBES_MISCOUNTED * spacing
 
 
 def chance_of_one(looks: Looks, run: RunOfStops) -> float:

@@ -9,7 +9,8 @@ of GPS data", Journal of Geodesy 72 (1998), for several degrees of freedom.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, BlunderKind, Hypothesis, effect_of
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
-from groundstation.survey.adjustment.scores import UNTOLD, free_information
+from groundstation.survey.adjustment.scores import MOST_AT_ONCE, UNTOLD, free_information
 from groundstation.survey.adjustment.toe_weights import moved_looks
 
 Array = npt.NDArray[np.float64]
@@ -59,7 +60,7 @@ def least_noncentrality(width: int, chance: float = FALSE_ALARM_OF_ONE, power: f
 def measure_reliability(
     found: Adjusted,
     run: RunOfStops,
-    hypotheses: Iterable[Hypothesis],
+    hypotheses: Sequence[Hypothesis],
     weights: Array,
     sizes: Mapping[BlunderKind, float],
     chance: float = FALSE_ALARM_OF_ONE,
@@ -76,7 +77,19 @@ def measure_reliability(
     chance, power : of a false alarm of one test; of finding. ``chance_of_one`` of ``blunders`` is that of a whole hole
     """
     moved = moved_by_functional(found, weights)
-    return [_of_one(found, run, one, moved, sizes, chance, power) for one in hypotheses]
+    told: dict[Hypothesis, Reliability] = {}
+    for width, same in itertools.groupby(sorted(hypotheses, key=_width_of), key=_width_of):
+        needed = least_noncentrality(width, chance, power)
+        part = list(dict.fromkeys(same))
+        every = max(1, MOST_AT_ONCE // (9 * width * max(1, len(found.looks))))
+        for at in range(0, len(part), every):
+            some = part[at : at + every]
+            told |= zip(some, _of_alike(found, run, some, moved, sizes, needed), strict=True)
+    return [told[one] for one in hypotheses]
+
+
+def _width_of(one: Hypothesis) -> int:
+    return WIDTHS[one.kind]
 
 
 def moved_by_functional(found: Adjusted, weights: Array) -> Array:
@@ -85,23 +98,33 @@ def moved_by_functional(found: Adjusted, weights: Array) -> Array:
     return np.asarray(found.linear.weights @ moved_looks(found, states, common))
 
 
-def _of_one(
+def _of_alike(
     found: Adjusted,
     run: RunOfStops,
-    one: Hypothesis,
+    part: Sequence[Hypothesis],
     moved: Array,
     sizes: Mapping[BlunderKind, float],
-    chance: float,
-    power: float,
+    needed: float,
+) -> Iterator[Reliability]:
+    """Reliability of blunders of one width q, which are found from a non-centrality on."""
+    columns = np.zeros((len(found.looks), 3, len(part), WIDTHS[part[0].kind]))
+    for place, one in enumerate(part):
+        rows, effect = effect_of(one, found.looks, run, found.now, found.linear)
+        columns[rows, :, place] = effect
+    whole, free = free_information(found, np.arange(len(found.looks)), columns)
+    effects = np.einsum("kahq,kar->hqr", columns, moved)
+    for one, effect, its_whole, its_free in zip(part, effects, whole, free, strict=True):
+        yield _of_one(one, effect, its_whole, its_free, sizes, needed)
+
+
+def _of_one(
+    one: Hypothesis, effect: Array, whole: Array, free: Array, sizes: Mapping[BlunderKind, float], needed: float
 ) -> Reliability:
-    rows, columns = effect_of(one, found.looks, run, found.now, found.linear)
-    whole, free = (part[0] for part in free_information(found, rows, columns[:, :, None]))
-    effect = np.einsum("kaq,kar->qr", columns, moved[rows])
+    """Reliability of a blunder by what one unit of it does to each functional (q, r), and its information (q, q)."""
     size = 1.0 if one.kind in KNOWN_SIZE else sizes.get(one.kind, np.inf)
     by_size = np.linalg.norm(effect, axis=0)
     by_size = np.where(by_size > 0.0, by_size * size, 0.0) if np.isfinite(size) else np.full(len(by_size), np.inf)
     values, vectors = np.linalg.eigh(free)
-    needed = least_noncentrality(WIDTHS[one.kind], chance, power)
     if values[0] <= UNTOLD * max(float(np.trace(whole)), 1e-300):
         return Reliability(one, np.inf, np.full(effect.shape[1], np.inf), by_size)
     at_toe = np.sqrt(needed * np.sum((vectors.T @ effect) ** 2 / values[:, None], axis=0))

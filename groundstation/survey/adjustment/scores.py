@@ -17,7 +17,6 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.hypotheses import WIDTHS, Hypothesis, effect_of
 from groundstation.survey.adjustment.kernels.path_elimination import reduce_right
-from groundstation.survey.adjustment.looks import OF_TUBE
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 
 Array = npt.NDArray[np.float64]
@@ -96,21 +95,28 @@ def whitened_effects(found: Adjusted, rows: Places, weighed: Array) -> tuple[Arr
     reduce_right(diagonal, tied, right)
     flat = right.reshape(-1, right.shape[2])
     left = in_common - coupled.reshape(len(flat), -1).T @ flat
-    return flat, np.asarray(np.linalg.cholesky(found.common_cov).T @ left)
+    return flat, np.asarray(found.common_root.T @ left)
 
 
 def pulled_unknowns(found: Adjusted, rows: Places, weighed: Array) -> tuple[Array, Array]:
     """A^T W H of weighed columns (k, 3, r): for directions (s + 1, 2, r) and what is in common (p, r)."""
     looks, width = found.looks, weighed.shape[2]
     pulled = np.swapaxes(found.linear.jacobians[rows], 1, 2) @ weighed
-    of_path = np.zeros((len(found.path.md), 2, width))
-    np.add.at(of_path, looks.station[rows], pulled[:, :2])
-    tubes = np.zeros((found.string.count, OF_TUBE, width))
-    np.add.at(tubes, looks.tube[rows], pulled[:, 2:8])
-    make_ups = np.zeros((len(found.now.make_ups), width))
-    np.add.at(make_ups, looks.make_up[rows], pulled[:, 7])
+    of_path = sums_by(looks.station[rows], pulled[:, :2], len(found.path.md))
+    tubes = sums_by(looks.tube[rows], pulled[:, 2:8], found.string.count)
+    make_ups = sums_by(looks.make_up[rows], pulled[:, 7], len(found.now.make_ups))
     further = np.einsum("kae,kar->er", found.extra.columns[rows], weighed)
     return of_path, np.concatenate([tubes.reshape(-1, width), pulled[:, 8].sum(axis=0)[None], make_ups, further])
+
+
+def sums_by(places: Places, parts: Array, count: int) -> Array:
+    """Sums (count, ...) of parts (k, ...) at each of their places (k,)."""
+    sums = np.zeros((count, *parts.shape[1:]))
+    if len(places):
+        order = np.argsort(places, kind="stable")
+        different, starts = np.unique(places[order], return_index=True)
+        sums[different] = np.add.reduceat(parts[order], starts, axis=0)
+    return sums
 
 
 def best_sizes(scores: Array, whole: Array, free: Array) -> tuple[Array, Array, Places, Array]:

@@ -9,7 +9,7 @@ procedure for use in multi sensor integration", ION GPS (1990): detection, ident
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,6 +44,7 @@ from groundstation.survey.adjustment.starting_point import first_start
 Array = npt.NDArray[np.float64]
 WIDE_FORCE, WIDE_TILT, WIDE_TURN, WIDE_DEPTH = 1.0, 0.2, 3.0, 10.0  # m/s^2, rad, rad, m before a blunder is found
 BENT = (*BY_DEPTH, *BY_TILT, BlunderKind.HOLE_MOVED)  # whose columns are others once the hole stands right
+NOT_SOUGHT = (*KNOWN_SIZE, BlunderKind.COLLAR_WRONG)  # put right in the looks, and left open in the path
 ROUNDS = 4
 SETTLED, STRAIGHT = 0.1, 0.01  # standard deviations, and rad or m, of a turn or depth that is found in addition
 
@@ -73,7 +74,7 @@ def adjust_with(
 ) -> TakenIn:
     """Adjust a hole with blunders taken in; without any it is ``adjust_hole``."""
     looks = put_right(looks, blunders)
-    told, sought = path, [one for one in blunders if one.kind not in (*KNOWN_SIZE, BlunderKind.COLLAR_WRONG)]
+    told, sought = path, [one for one in blunders if one.kind not in NOT_SOUGHT]
     if len(sought) < len(blunders) and any(one.kind is BlunderKind.COLLAR_WRONG for one in blunders):
         path = untold_collar(path)
     now = replace(start or first_start(looks, string, path), extra=np.zeros(0))
@@ -90,26 +91,25 @@ def adjust_with(
             break
         now = replace(found.now, extra=np.zeros(0))
         turned = _turned_back(looks, run, sought, sizes)
-    shown = iter(_places(sought))
-    slices = {one: next(shown) for one in sought}
-    shares = [_share_of(one, slices, sizes, cov, found, told) for one in blunders]
+    slices = places_among_further(blunders)
+    shares = [_share_of(one, at, sizes, cov, found, told) for one, at in zip(blunders, slices, strict=True)]
     return TakenIn(found, tuple(size for size, _ in shares), tuple(share for _, share in shares))
 
 
 def _share_of(
-    one: Hypothesis,
-    slices: Mapping[Hypothesis, slice],
-    sizes: Array,
-    cov: Array,
-    found: Adjusted,
-    told: PathPrior,
+    one: Hypothesis, at: slice, sizes: Array, cov: Array, found: Adjusted, told: PathPrior
 ) -> tuple[Array, Array]:
     """Size and covariance of one blunder; empty where the size is known."""
     if one.kind is BlunderKind.COLLAR_WRONG:
         ends = np.stack([found.now.tangents[0], told.collar])
         return bends_between(ends, found.bases[:1].repeat(2, axis=0))[0], found.covs[0, :2, :2]
-    at = slices.get(one, slice(0, 0))
     return sizes[at], cov[at, at]
+
+
+def places_among_further(blunders: Sequence[Hypothesis]) -> list[slice]:
+    """Where each blunder stands among the further unknowns; empty of one whose size is known."""
+    shown = iter(_places([one for one in blunders if one.kind not in NOT_SOUGHT]))
+    return [slice(0, 0) if one.kind in NOT_SOUGHT else next(shown) for one in blunders]
 
 
 def _is_of(sought: Sequence[Hypothesis], kinds: Sequence[BlunderKind]) -> npt.NDArray[np.bool_]:

@@ -8,7 +8,7 @@ themselves.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -223,6 +223,11 @@ class SharedErrors:
             names: list[Name] = [("scale",), ("offset",), *(("length", tube) for tube in below)]
             known = self._known[key] = np.array([self._place_of(name) for name in names], np.intp)
         return known
+
+    def places_of_lengths(self, tubes: Iterable[int]) -> dict[int, int]:
+        """Place of the error of the length of each of some tubes, by tube, where a node above it has read."""
+        names = ((tube, ("length", tube)) for tube in tubes)
+        return {tube: self._columns[name] for tube, name in names if name in self._columns}
 
     def chain_of(self, tube: int, above: Sequence[int] | None) -> int:
         """Number of a tube with the joints above it, in the order in which they were met."""

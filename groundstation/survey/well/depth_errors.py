@@ -18,7 +18,7 @@ The sigmas that stand where nothing was told:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final, NamedTuple
@@ -53,10 +53,17 @@ class StationDepth:
     own_var: float  # m^2
 
 
+NONE_TOLD: Final[Mapping[int, float]] = {}
 EXACT: Final = StationDepth(Packed(np.zeros((1, 0))), 0.0)
 
 
-def mean_depth(md: float, places: Sequence[Places], errors: DepthErrors, tube_length: float) -> StationDepth:
+def mean_depth(
+    md: float,
+    places: Sequence[Places],
+    errors: DepthErrors,
+    tube_length: float,
+    told: Mapping[int, float] = NONE_TOLD,
+) -> StationDepth:
     """Depth error of a station that several nodes read, one reading as good as another.
 
     Parameters
@@ -64,13 +71,19 @@ def mean_depth(md: float, places: Sequence[Places], errors: DepthErrors, tube_le
     md : m
     places : of the columns of each reading: scale, offset, and the length of each tube below its node from the bit up
     tube_length : m, as it is told
+    told : m, standard deviations of the lengths of single tubes, by the places of their columns
     """
     counts, count = (*map(len, places),), len(places)
     parts = reading_parts(counts, places[counts.index(max(counts))].tobytes())
-    values = errors.tube_std * parts.tubes
+    values = _tube_stds(parts.places, errors.tube_std, told) * parts.tubes
     values[0, parts.scale] = errors.scale_std * (md + tube_length * parts.tubes_below)
     values[0, parts.offset] = errors.offset_std
     return StationDepth(Packed.of_values(values, parts.places, parts.width), errors.reading_std**2 / count)
+
+
+def _tube_stds(places: Places, usual: float, told: Mapping[int, float]) -> Array | float:
+    """Standard deviations (c,), m, of lengths with these columns; one number where all are alike."""
+    return np.array([told.get(place, usual) for place in places.tolist()]) if told else usual
 
 
 class ReadingParts(NamedTuple):

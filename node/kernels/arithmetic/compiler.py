@@ -8,6 +8,8 @@ lowest that pyproject.toml allows. What each part buys:
   and all. The alternative is every such module twice.
 * ``ByAddress``: a kernel that calls a node's step needs no copy of it (``benchmarks/by_address.py``).
 * ``NO_WRAPPER``: kernels that are never called through a C pointer are compiled without code for that.
+* ``ONLY_BORROWED``: kernels count no references to the arrays that they are given, which took a quarter of a node's
+  step; one that would make an array is refused as it is compiled.
 * ``kept_where``: a kept function is known by our sources and not by the date of its file.
 * ``leave_blas_out``: a process starts a quarter of a second sooner.
 """
@@ -29,7 +31,9 @@ from numba.core.typing.typeof import Purpose
 from numba.extending import lower_cast, models, overload, register_model, typeof_impl
 
 __all__ = [
+    "COUNTED",
     "NO_WRAPPER",
+    "ONLY_BORROWED",
     "ByAddress",
     "ConstantType",
     "UserProvidedCacheLocator",
@@ -40,6 +44,8 @@ __all__ = [
 
 FORMS: Final = (types.float64, types.int64)
 NO_WRAPPER: Final[dict[str, Any]] = {"no_cfunc_wrapper": True}
+ONLY_BORROWED: Final[dict[str, Any]] = {"_nrt": False}  # the caller owns every array, so none may be returned either
+COUNTED: Final[dict[str, Any]] = {"_nrt": True}
 
 
 class ConstantType(types.Opaque):

@@ -24,10 +24,10 @@ import numba
 import numpy as np
 from numba import config, njit
 
-from node.kernels.arithmetic.compiler import NO_WRAPPER, UserProvidedCacheLocator, kept_where
+from node.kernels.arithmetic.compiler import COUNTED, NO_WRAPPER, ONLY_BORROWED, UserProvidedCacheLocator, kept_where
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-OPTIONS: Final[dict[str, Any]] = {"cache": True, "error_model": "numpy", **NO_WRAPPER}
+OPTIONS: Final[dict[str, Any]] = {"cache": True, "error_model": "numpy", **NO_WRAPPER, **ONLY_BORROWED}
 
 
 @functools.cache
@@ -116,13 +116,18 @@ def compile_function(function: Function, **options: Any) -> Function:
 
 
 def kernel(function: Function) -> Function:
-    """Compile ``function`` on its first call or load it from the cache."""
+    """Compile ``function`` on its first call or load it from the cache; it neither makes nor returns an array."""
     return compile_function(function)
 
 
 def entry_kernel(function: Function) -> Function:
     """Compile ``function`` as a kernel that others may call by its address, and need not hold a copy of."""
     return compile_function(function, no_cfunc_wrapper=False)
+
+
+def allocating_kernel(function: Function) -> Function:
+    """Compile ``function`` as a kernel that makes arrays for its own use, and so counts the references to all."""
+    return compile_function(function, **COUNTED)
 
 
 def shared_body(function: Function) -> Function:

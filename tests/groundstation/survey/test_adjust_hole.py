@@ -1,5 +1,6 @@
 """An adjusted hole against drawn truths: directions within their sigmas, whatever is known of yaws and joints."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -11,6 +12,8 @@ from scipy.spatial.transform import Rotation
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks, PathPrior, StringPrior
+from groundstation.survey.adjustment.play import faster_play
+from groundstation.survey.adjustment.sphere import carried_bases
 
 Array = npt.NDArray[np.float64]
 DEG = math.pi / 180.0
@@ -56,6 +59,36 @@ def felt(tangent: Array, face: float, tilt: Array) -> Array:
     lean = Rotation.from_rotvec(axis / max(float(np.linalg.norm(axis)), 1e-12) * angle)
     body = lean * Rotation.from_euler("z", face)
     return np.asarray(Rotation.from_rotvec([*tilt, 0.0]).apply(body.inv().apply([0.0, 0.0, -G])))
+
+
+def test_bases_are_carried_along_by_the_shortest_turns() -> None:
+    """Each from the one before by the rotation along the great circle, at any bend; across the direction.
+
+    A direction that turns back on itself has no shortest turn: then they are across it all the same.
+    """
+    random = np.random.default_rng(1)
+    tangents = random.normal(size=(40, 3))
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    tangents[20] = -tangents[19]
+    bases = carried_bases(tangents)
+    for k, (before, after) in enumerate(itertools.pairwise(tangents)):
+        np.testing.assert_allclose(bases[k + 1] @ bases[k + 1].T, np.eye(2), atol=1e-12)
+        np.testing.assert_allclose(bases[k + 1] @ after, 0.0, atol=1e-12)
+        np.testing.assert_allclose(np.cross(after, bases[k + 1, 0]), bases[k + 1, 1], atol=1e-12)
+        axis = np.cross(before, after)
+        if (sine := float(np.linalg.norm(axis))) > 1e-9:
+            turn = Rotation.from_rotvec(axis / sine * math.atan2(sine, float(before @ after)))
+            np.testing.assert_allclose(bases[k + 1], turn.apply(bases[k]), atol=1e-9)
+
+
+@pytest.mark.parametrize("slope", [-1.5, -1.0, -0.5, 0.0, 0.5, 0.75])
+def test_the_play_that_is_gone_on_with_settles_whatever_way_it_swings(slope: float) -> None:
+    """What is found goes as a power of what was tried, about a place of its own; five steps find that."""
+    place, tried, var = 2e-8, list[tuple[float, float]](), 3e-6
+    for _ in range(5):
+        tried.append((var, place * (var / place) ** slope))
+        var = faster_play(tried)
+    assert var == pytest.approx(place, rel=1e-6)
 
 
 def squares_of(found: Adjusted, truth: Array) -> Array:

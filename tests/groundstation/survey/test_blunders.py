@@ -24,6 +24,7 @@ from groundstation.survey.adjustment.hypotheses import (
     effect_amplitudes,
     thinned_stops,
 )
+from groundstation.survey.adjustment.play import told_by_all
 from groundstation.survey.adjustment.scores import log_tail, score_hypotheses
 from groundstation.survey.adjustment.screen import is_suspicious
 from groundstation.survey.adjustment.taken_in import adjust_with, deviance_of
@@ -56,6 +57,18 @@ def test_a_score_is_that_of_dense_matrices(honest: DrawnString, kind: BlunderKin
         np.testing.assert_allclose(scores.free[place], free, rtol=2e-3, atol=2e-3 * np.max(np.abs(free)))
         t = columns.T @ pulled
         assert scores.squares[place] == pytest.approx(t @ np.linalg.solve(free, t), rel=0.02, abs=0.02)
+
+
+def test_what_all_looks_tell_is_that_of_dense_matrices(honest: DrawnString) -> None:
+    """The trace of any weights times J Q J^T, look by look, as the play is learnt with."""
+    found = adjust_hole(honest.looks, honest.string, honest.path)
+    dense, lot = DenseHole(found), np.random.default_rng(3)
+    roots = lot.normal(size=(len(honest.looks), 3, 3))
+    weights = roots @ np.swapaxes(roots, 1, 2)
+    told = dense.A @ dense.cov @ dense.A.T
+    by_look = [told[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] for k in range(len(honest.looks))]
+    expected = sum(float(np.trace(weight @ part)) for weight, part in zip(weights, by_look, strict=True))
+    assert told_by_all(found, weights) == pytest.approx(expected, rel=2e-3)
 
 
 def dense_effect(one: Hypothesis, dense: DenseHole, drawn: DrawnString) -> Array:

@@ -25,6 +25,11 @@ class BlunderRow:
     second_evidence: Annotated[float | None, "of the second best"]
     misfit_before: Annotated[float, "of all surveys without it, 1 is as it should be"]
     misfit_after: Annotated[float, "of all surveys with it"]
+    best: Annotated[str, "best explanation in words"]
+    second: Annotated[str | None, "second best in words, and how likely it is beside the best"]
+    moved_cm: Annotated[float | None, "by which the toe would be elsewhere were it not put right; null of a known size"]
+    sigma_cm: Annotated[float | None, "standard deviation that it adds at the toe, since its size is not known exactly"]
+    todo: Annotated[str, "what to do about it"]
 
 
 @answer_class
@@ -49,12 +54,35 @@ class ToeShare:
 
 
 @answer_class
+class ToePart:
+    """What all errors of one source give to the sigma at the toe together."""
+
+    source: Annotated[str, "kind of error, as of `toe`"]
+    words: Annotated[str, "the same for people, with the tube that gives most"]
+    sigma_cm: Annotated[float, "standard deviation at the toe that it makes, the larger of north and east"]
+    percent: Annotated[float, "of the variance at the toe to north and east"]
+
+
+@answer_class
+class LeastFound:
+    """A mistake that may be made at the last stop, of its kind the one that does most at the toe when not found."""
+
+    kind: Annotated[str, "what would be wrong", OneOf(*(kind.value for kind in BlunderKind))]
+    subject: Name
+    smallest: Annotated[float | None, "size from which on it would be found; null if nothing can tell"]
+    unit: Annotated[str, "of it: mg, deg or m"]
+    unfound_cm: Annotated[float | None, "what one that is not found does at the toe at most"]
+    words: Annotated[str, "all of it for people"]
+
+
+@answer_class
 class NextStopAdvice:
     """Where to stop next: the turn of the string against this stop after which the toe is known best."""
 
     turn_deg: Annotated[float, "by which to turn the string on, against where it stands at the last stop"]
-    sigma_cm: Annotated[float, "standard deviation of the new toe after it"]
+    sigma_cm: Annotated[float, "standard deviation of the new toe after it, to north or east in the mean"]
     same_face_cm: Annotated[float, "the same without a turn"]
+    words: Annotated[str, "the same for people"]
 
 
 @answer_class
@@ -65,9 +93,15 @@ class AdjustmentAnswer:
     redundancy: Annotated[float, "numbers beyond those that the hole and its tubes need"]
     misfit: Annotated[float | None, "weighted squares of what is left over what they are to be: 1 is as it should be"]
     play_deg: Annotated[float | None, "by which tubes lie askew in the hole from stop to stop, as the surveys show it"]
+    counts: Annotated[bool, "directions and sigmas that are shown elsewhere are those of this adjustment"]
+    said: Annotated[str, "how well all surveys fit, in words"]
+    toe_md_m: Annotated[float | None, "depth of the last station, the toe"]
     sigma_toe_cm: Annotated[float | None, "standard deviation at the toe, the larger of north and east"]
     searched: Annotated[int, "surveys by which it was looked for what is wrong; of the newest that may still go on"]
     blunders: list[BlunderRow]
     toe: list[ToeShare]
+    parts: list[ToePart]
+    left_out: Annotated[str, "what is in no sigma, in words"]
+    unfound: list[LeastFound]
     tubes: list[AdjustedTube]
     next_stop: NextStopAdvice | None

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.arithmetic.jit import kernel
+from node.kernels.arithmetic.jit import allocating_kernel
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
 
 
-@kernel
+@allocating_kernel
 def free_parts(
     station: Places, tube: Places, make_up: Places, jacobians: Array, weights: Array, extra: Array, gravity_at: int,
     of_direction: Array, coupled: Array, of_common: Array, out: Array,
@@ -39,7 +39,7 @@ def free_parts(
         take_from_weight(weights[k], rows, cov, out[k])
 
 
-@kernel
+@allocating_kernel
 def gather_covariance(of_direction: Array, coupled: Array, of_common: Array, at: Places, out: Array) -> None:
     """Covariance of the unknowns of one look: a direction (2) and what it has in common with others."""
     out[:2, :2] = of_direction
@@ -50,7 +50,7 @@ def gather_covariance(of_direction: Array, coupled: Array, of_common: Array, at:
             out[a, b] = of_common[at[a], at[b]]
 
 
-@kernel
+@allocating_kernel
 def take_from_weight(weight: Array, rows: Array, cov: Array, out: Array) -> None:
     """Set W - W R C R^T W, (3, 3)."""
     weighed = np.zeros(rows.shape)

@@ -17,7 +17,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.arithmetic.jit import kernel
+from node.kernels.arithmetic.jit import allocating_kernel, kernel
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
@@ -102,7 +102,7 @@ def invert_in_place(m: Array) -> None:
     m[1, 0], m[2, 0], m[2, 1] = m[0, 1], m[0, 2], m[1, 2]
 
 
-@kernel
+@allocating_kernel
 def add_looks(
     station: Places, tube: Places, make_up: Places, jacobians: Array, weights: Array, residuals: Array, extra: Array,
     gravity_at: int, at_station: Array, coupled: Array, in_common: Array,

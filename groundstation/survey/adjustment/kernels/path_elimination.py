@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.arithmetic.jit import kernel
+from node.kernels.arithmetic.jit import allocating_kernel, kernel
 
 Array = npt.NDArray[np.float64]
 
@@ -59,7 +59,7 @@ def substitute_path(diagonal: Array, tied: Array, right: Array) -> None:
         divide_by_transposed(diagonal[j], right[j])
 
 
-@kernel
+@allocating_kernel
 def path_covariances(diagonal: Array, tied: Array, covs: Array) -> None:
     """Covariances (s + 1, 4, 4) of the states where what stations have in common is known, set."""
     for j in range(len(diagonal)):

@@ -13,13 +13,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.arithmetic.jit import kernel
+from node.kernels.arithmetic.jit import allocating_kernel, kernel
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
 
 
-@kernel
+@allocating_kernel
 def add_stations(
     weights: Array, ends: Array, starts: Places, places: Places, lean: Array, down: Array, covs: Array, kinks: Array,
     alongs: Array, depth_starts: Places, depth_places: Places, depths: Array, widths: Places, passed: Array,

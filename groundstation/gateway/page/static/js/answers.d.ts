@@ -394,6 +394,16 @@ export interface BlunderRow {
   misfit_before: number;
   /** of all surveys with it */
   misfit_after: number;
+  /** best explanation in words */
+  best: string;
+  /** second best in words, and how likely it is beside the best */
+  second: string | null;
+  /** by which the toe would be elsewhere were it not put right; null of a known size */
+  moved_cm: number | null;
+  /** standard deviation that it adds at the toe, since its size is not known exactly */
+  sigma_cm: number | null;
+  /** what to do about it */
+  todo: string;
 }
 
 /** What one source gives to the sigma at the toe. */
@@ -404,6 +414,34 @@ export interface ToeShare {
   subject: string;
   /** standard deviation at the toe that it makes, the larger of north and east */
   sigma_cm: number;
+}
+
+/** What all errors of one source give to the sigma at the toe together. */
+export interface ToePart {
+  /** kind of error, as of `toe` */
+  source: string;
+  /** the same for people, with the tube that gives most */
+  words: string;
+  /** standard deviation at the toe that it makes, the larger of north and east */
+  sigma_cm: number;
+  /** of the variance at the toe to north and east */
+  percent: number;
+}
+
+/** A mistake that may be made at the last stop, of its kind the one that does most at the toe when not found. */
+export interface LeastFound {
+  /** what would be wrong */
+  kind: "bias_stepped" | "bias_creeps" | "bias_wrong" | "tilt_slipped" | "tilt_wrong" | "mount_turned" | "mount_misread" | "joint_slipped" | "joint_misread" | "encoder_slipped" | "encoder_drifts" | "hole_moved" | "depth_wrong_once" | "depth_wrong_from" | "axes_exchanged" | "tubes_exchanged" | "look_wrong" | "collar_wrong";
+  /** what it is of, such as a tube; empty of all */
+  subject: string;
+  /** size from which on it would be found; null if nothing can tell */
+  smallest: number | null;
+  /** of it: mg, deg or m */
+  unit: string;
+  /** what one that is not found does at the toe at most */
+  unfound_cm: number | null;
+  /** all of it for people */
+  words: string;
 }
 
 /** A tube as all surveys of the hole show it. */
@@ -426,10 +464,12 @@ export interface AdjustedTube {
 export interface NextStopAdvice {
   /** by which to turn the string on, against where it stands at the last stop */
   turn_deg: number;
-  /** standard deviation of the new toe after it */
+  /** standard deviation of the new toe after it, to north or east in the mean */
   sigma_cm: number;
   /** the same without a turn */
   same_face_cm: number;
+  /** the same for people */
+  words: string;
 }
 
 /** One adjustment of the whole hole: how well all surveys fit, what is wrong, and what each thing costs. */
@@ -442,12 +482,22 @@ export interface AdjustmentAnswer {
   misfit: number | null;
   /** by which tubes lie askew in the hole from stop to stop, as the surveys show it */
   play_deg: number | null;
+  /** directions and sigmas that are shown elsewhere are those of this adjustment */
+  counts: boolean;
+  /** how well all surveys fit, in words */
+  said: string;
+  /** depth of the last station, the toe */
+  toe_md_m: number | null;
   /** standard deviation at the toe, the larger of north and east */
   sigma_toe_cm: number | null;
   /** surveys by which it was looked for what is wrong; of the newest that may still go on */
   searched: number;
   blunders: BlunderRow[];
   toe: ToeShare[];
+  parts: ToePart[];
+  /** what is in no sigma, in words */
+  left_out: string;
+  unfound: LeastFound[];
   tubes: AdjustedTube[];
   next_stop: NextStopAdvice | null;
 }
@@ -651,9 +701,11 @@ export interface SetupRow {
   /** name, such as north, joint.4-3 and mount.3 */
   item: string;
   /** what it is */
-  kind: "north" | "collar" | "joint" | "length" | "stick_up" | "mount" | "mount_turn" | "depth_scale" | "depth_offset" | "accelerometer" | "gyroscope" | "play" | "path" | "gravity";
+  kind: "north" | "collar" | "joint" | "length" | "stick_up" | "mount" | "mount_turn" | "depth_scale" | "accelerometer" | "gyroscope" | "play" | "path" | "gravity";
   /** tube, or joint as upper and lower tube; empty of what the rig has once */
   subject: string;
+  /** name for people, such as accelerometer of tube 3 */
+  words: string;
   /** one, of the collar inclination and azimuth; empty where it may be any */
   value: number[];
   /** standard deviation of each */
@@ -692,6 +744,8 @@ export interface SetupAnswer {
   todo: string;
   /** item that costs most at the toe, across the hole */
   worst: string;
+  /** the same for people, with what it costs */
+  costs_most: string;
   /** measured depth of the toe */
   at_m: number;
   /** the costs are of the hole as surveyed; before the first station of its design */

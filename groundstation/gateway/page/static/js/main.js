@@ -1,5 +1,6 @@
 // The page: takes what the stream brings, shows it four times a second, and connects the buttons.
 
+import { connectChecks, showChecks, showEnd } from "./checks.js";
 import { byId, write } from "./dom.js";
 import { History } from "./history.js";
 import { showAlarms, showOrders, showString, showTubes, showWall } from "./lists.js";
@@ -56,6 +57,8 @@ function paint() {
     agedAt = now.steady;
     showSetup(picture.answers.setup, now.wall);
   }
+  if (isNew("adjustment")) showChecks(picture.answers.adjustment);
+  if (isNew("column")) showEnd(picture.answers.column);
   if (isNew("wall")) showWall(wall?.wall);
   if (isNew("alarms")) showAlarms(alarms, orderAboutAlarm);
   if (isNew("orders")) showOrders(orders);
@@ -99,6 +102,7 @@ byId("depth").addEventListener("click", () => order("accept_depth", { action: "c
 byId("tube").addEventListener("change", (event) => { event.target.dataset.chosen = event.target.value; });
 byId("space").addEventListener("click", turnPlan);
 byId("print").addEventListener("click", () => window.print());
+connectChecks();
 connectSetup((name, parameters) => order(name, parameters, tell));
 connectTheme(byId("theme"));
 

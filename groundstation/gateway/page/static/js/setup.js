@@ -26,12 +26,15 @@ export function showSetup(setup, now) {
   byId("ready").className = setup.ready ? "" : "not";
   write(byId("ready"), setup.ready ? "Ready to drill: north and every joint are told" : `NOT READY TO DRILL, not told: ${setup.missing.join(", ")}`);
   const whose = setup.surveyed ? "as surveyed" : "of the design";
-  write(byId("next"), `Next: ${setup.todo}`);
+  const [todo, how] = setup.todo.split(/: (.*)/);
+  write(byId("worst"), `Costs most at the toe: ${setup.costs_most}`);
+  write(byId("next"), `Next: ${todo}${how && !how.startsWith("cmd/") ? `: ${how}` : ""}`);
+  write(byId("how"), how?.startsWith("cmd/") ? `by the form below, or ${how}` : "");
   write(byId("costs"), `Toe at ${setup.at_m.toFixed(1)} m, ${whose}. Its ± has besides: ${setup.left_out}.`);
   fillList(byId("setup-items"), setup.items, (row) => row.item, () => element("tr", {}, ...Array.from({ length: 7 }, () => element("td"))), (line, row) => {
     line.className = row.missing ? "grave" : !row.told && row.toe_cm >= LEAST_CM ? "serious" : "";
     const toe = `${row.toe_cm.toFixed(1)}${row.toe_cm >= LEAST_CM && row.way === "along" ? " along" : ""}`;
-    const texts = [row.item.replaceAll("_", " "), toe, valueText(row), plain(row.sigma), row.unit, ageText(row, now), `${row.source}: ${row.detail}`];
+    const texts = [row.words, toe, valueText(row), plain(row.sigma), row.unit, ageText(row, now), `${row.source}: ${row.detail}`];
     texts.forEach((text, place) => write(line.children[place], text));
   });
 }

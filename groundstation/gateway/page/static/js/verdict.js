@@ -20,7 +20,7 @@ export function showVerdict(picture, now, { replay }) {
   write(byId("told"), found.line.replace(/^[^:]*: /, ""));
   const doubt = found.verdict === "dont_know" && found.by_surveys !== "dont_know";
   write(byId("todo"), doubt ? `the surveys alone said ${WORDS[found.by_surveys]}; do not count on it` : found.todo);
-  write(byId("why"), found.why.join("; "));
+  write(byId("why"), found.why.filter((why) => !found.line.endsWith(why)).join("; "));
   document.title = `${word} ${picture.answers.status?.rig ?? ""}`;
 }
 

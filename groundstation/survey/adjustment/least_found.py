@@ -1,0 +1,57 @@
+"""The smallest mistake of each kind that would be found at the last stop, where it would do most at the toe."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from groundstation.survey.adjustment.hypotheses import BlunderKind, Hypothesis
+from groundstation.survey.adjustment.looks import Looks
+from groundstation.survey.adjustment.reliability import Reliability
+from groundstation.survey.adjustment.run_of_stops import JOINT, RunOfStops
+
+K = BlunderKind
+DEG: Final = np.pi / 180.0
+LARGEST: Final[Mapping[BlunderKind, float]] = {  # that is to be reckoned with where nothing would find it; SI and rad
+    K.BIAS_STEPPED: 0.2,  # 20 mg: a sensor that was knocked
+    K.TILT_SLIPPED: 0.5 * DEG,  # of a mount as it is made
+    K.MOUNT_TURNED: 5.0 * DEG,
+    K.JOINT_SLIPPED: 5.0 * DEG,
+    K.ENCODER_SLIPPED: 7.2 * DEG,  # one tooth of a belt of fifty
+    K.DEPTH_WRONG_ONCE: 0.5,
+}
+
+
+def possible_mistakes(looks: Looks, run: RunOfStops) -> list[Hypothesis]:
+    """What may go wrong at the last stop: with each tube that looked there, its joint, the encoder, the depth."""
+    return list(_of_last_stop(looks, run))
+
+
+def _of_last_stop(looks: Looks, run: RunOfStops) -> Iterator[Hypothesis]:
+    newest = {int(tube): int(stop) for tube, stop in zip(looks.tube, looks.stop, strict=True)}
+    last = max(newest.values())
+    for tube, stop in newest.items():
+        yield Hypothesis(K.BIAS_STEPPED, (tube,), stop)
+        yield Hypothesis(K.TILT_SLIPPED, (tube,), stop)
+        yield Hypothesis(K.MOUNT_TURNED, (tube,), stop)
+    for kind, tube in run.causes.names:
+        if kind == JOINT and last:
+            yield Hypothesis(K.JOINT_SLIPPED, (tube,), last)
+    if last:
+        yield Hypothesis(K.ENCODER_SLIPPED, (), last)
+        yield Hypothesis(K.DEPTH_WRONG_ONCE, (), last)
+
+
+def worst_of_kinds(told: Sequence[Reliability]) -> list[Reliability]:
+    """Of each kind that which does most at the toe when it is not found, to north or east; the worst first."""
+    by_kind = sorted(told, key=lambda one: list(K).index(one.hypothesis.kind))
+    groups = itertools.groupby(by_kind, key=lambda one: one.hypothesis.kind)
+    return sorted((max(same, key=unfound_across) for _, same in groups), key=lambda one: -unfound_across(one))
+
+
+def unfound_across(one: Reliability) -> float:
+    """What one that is not found does at the toe, m: the larger of north and east; the functionals are the toe's."""
+    return float(np.max(one.unfound[:2]))
