@@ -28,6 +28,7 @@ from sim.world.world import World
 USUAL: Final = KnownSetUp()
 BEYOND: Final = 3.0  # standard deviations
 FALSELY_BLAMED: Final = 0.001  # of honest holes, at most
+ENOUGH: Final = 3000  # honest holes: that none of them is blamed tells that with 95 %
 HONEST: Final = "honest"
 
 
@@ -164,6 +165,8 @@ def verdict_lines(result: dict[str, Any]) -> list[str]:
     checks = sorted({row["seen_by"] for row in rows if row["unseen"]})
     share = result["blamed"] / result["honest"]
     word = "holds" if share <= FALSELY_BLAMED else "is missed"
+    if share <= FALSELY_BLAMED and result["honest"] < ENOUGH:
+        word = f"takes {ENOUGH} to tell"
     return [
         f"{len({row['case'] for row in rows})} kinds: {missed} of {sum(row['rigs'] for row in rows)} rigs beyond "
         f"{BEYOND:g} standard deviations without a word, {wrong} of them or others ON TARGET; 0 expected",

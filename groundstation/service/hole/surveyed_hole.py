@@ -400,8 +400,8 @@ class SurveyedHole:
         depths, places_of = {}, self._stops.depth_places.__getitem__
         # how depths scatter is another thing at every stop, and is taken in where all stations are worked out anew
         errors = self._errors_of_depths() if self._is_adjusted else self._depth_errors
-        stds = length_stds(self._setup)
-        told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()}
+        stds = length_stds(self._setup) if self._setup.lengths else {}
+        told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()} if stds else {}
         for one in changed:
             places = [*map(places_of, one.stops.rows)]
             depths[one.md] = mean_depth(one.md, places, errors, self._config.tube_length, told)

@@ -89,8 +89,8 @@ def adjust_hole(
             tried = [*tried, (now.play_var, play)] if solution.step < NEAR else []
             now = replace(now, play_var=faster_play(tried) if tried else play)
         if again and not is_bent:
-            whole, legs = (part_of_way(*pair) for pair in ((now.curvature_var, whole), (now.leg_vars, legs)))
-            now = replace(now, curvature_var=float(whole), leg_vars=legs)
+            of_hole, of_legs = part_of_way(now.curvature_var, whole), part_of_way(now.leg_vars, legs)
+            now = replace(now, curvature_var=float(of_hole), leg_vars=of_legs)
     return found
 
 
