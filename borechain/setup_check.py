@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from groundstation.config import GroundConfig, checked_config
-from groundstation.service.alarms.verdict import VerdictDoubt
+from groundstation.service.alarms.verdict_words import VerdictDoubt
 
 if TYPE_CHECKING:
     from borechain.client import Ground

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import gc
+import threading
 from collections.abc import AsyncIterator, Callable, Iterator
 from functools import partial
 from typing import Any
@@ -13,6 +14,7 @@ from groundstation.config import GroundConfig, checked_config
 from groundstation.gateway.lease import take_lease
 from groundstation.gateway.page.page_settings import PageSettings, open_page_socket
 from groundstation.gateway.zenoh import ZenohGateway
+from groundstation.service.hole.blunder_search import RunApart
 from groundstation.service.process.ground_process import GroundProcess
 from node.kernels.arithmetic.formats import PERIOD
 from telemetry import keys
@@ -53,7 +55,7 @@ def run_ground(
         config = checked_config(**given, **settings)
         load_kernels()
         with (
-            contextlib.closing(start_ground_process(config, searches_apart=own_clock)) as process,
+            contextlib.closing(start_ground_process(config, run_on_thread if own_clock else None)) as process,
             page_of(page) as serve_page,
             rig_session(place, file_name(BASE)) as bus,
         ):
@@ -80,12 +82,19 @@ def load_kernels() -> None:
     warm_adjustment()
 
 
-def start_ground_process(config: GroundConfig, *, searches_apart: bool = False) -> GroundProcess:
+def run_on_thread(act: Callable[[], None]) -> threading.Thread:
+    """Do something on a thread of its own."""
+    thread = threading.Thread(target=act, daemon=True)
+    thread.start()
+    return thread
+
+
+def start_ground_process(config: GroundConfig, run_apart: RunApart | None = None) -> GroundProcess:
     """Return a ground station with everything computed and the longest answer made once, so that no first query waits.
 
     Nor does one wait for a garbage collection over what was imported and restored (0.1 s of ten thousand surveys).
     """
-    process = GroundProcess(config, searches_apart=searches_apart)
+    process = GroundProcess(config, run_apart=run_apart)
     process.operator.ask_json("measurements")
     gc.freeze()
     return process

@@ -324,11 +324,15 @@ async def test_north_is_missed_on_the_setup_panel_told_in_a_line_and_taken_back(
             assert "NOT READY TO DRILL, not told: north" in lines
             assert "next: tell north: cmd/north?action=tell;angle_deg=..;sigma_deg=.." in lines
             head = next(place for place, line in enumerate(lines) if line.startswith("item"))
-            assert lines[head + 1].split()[:4] == ["north", "0.5", "any", "104"]
-            assert "costs most at the toe: bends of the hole, 1.5 cm" in lines
+            told = rig.ask("setup")
+            assert lines[head + 1].split()[:4] == ["north", f"{told['items'][0]['toe_cm']:.1f}", "any", "104"]
+            worst = next(row for row in told["items"] if row["item"] == told["worst"])
+            assert f"costs most at the toe: {worst['words']}, {worst['toe_cm']:.1f} cm" in lines
             await pilot.press("o", *"north action=tell angle_deg=12.5 sigma_deg=0.3", "enter")
             text = await until(app, served, lambda text: "\nREADY TO DRILL" in text, speaks_of(3))
-            assert "next: align tube 1 in slow turns: cmd/align?tube=1" in text
+            todo = rig.ask("setup")["todo"]
+            assert "north" not in todo
+            assert f"next: {todo}" in text
             await pilot.press("o", *"setup action=undo", "enter")
             await until(app, served, lambda text: "NOT READY TO DRILL, not told: north" in text, speaks_of(3))
             await pilot.press("o", *"what", "escape", "u")

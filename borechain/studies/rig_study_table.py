@@ -65,7 +65,7 @@ RIG_STUDIES: Final = by_name(
                 Option("rigs", 40, 2, 10_000, help="Of each row of the second table."),
             ),
             counts="rigs",
-            full=("--seeds 1000",),
+            full=("--seeds 300 --rigs 20",),
             short="--seeds 2 --rigs 2",
         ),
         Study(

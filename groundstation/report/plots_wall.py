@@ -29,8 +29,9 @@ from groundstation.report.style import (
     styled,
     tidy_ticks,
 )
-from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.as_built import Columns
 from groundstation.survey.wall.column_joint import joint_thickness
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.wall_file import Wall
 from groundstation.survey.wall.wall_joints import ExtraColumn, Joints, pair_covariance, worst_joint
 from groundstation.survey.wall.wall_verdict import Judgement, true_runs

@@ -12,7 +12,7 @@ from groundstation.report.column_report import ColumnRecord, ReportSite, column_
 from groundstation.report.document import Document, Origin, ReportSection, report_pdf
 from groundstation.report.plots_wall import wall_figure
 from groundstation.report.style import svg_of
-from groundstation.survey.wall.as_built import ColumnState
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.wall_columns import state_words, survey_errors
 from groundstation.survey.wall.wall_file import Wall
 from groundstation.survey.wall.wall_joints import worst_depths, worst_joint

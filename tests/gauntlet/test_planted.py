@@ -20,7 +20,7 @@ from groundstation.service.process.learner import Learner
 from groundstation.service.string import known_string as string_module
 from groundstation.service.string.depth import DepthLog
 from groundstation.service.string.stored import Stored
-from groundstation.survey.fusion.survey_trust import Trust
+from groundstation.survey.fusion.trust_level import Trust
 from node.firmware.tube_settings import TubeSettings
 from node.process import counter as counter_module
 from node.process.command_handlers import CommandHandlers

@@ -15,8 +15,9 @@ import numpy as np
 from drawn_strings import SIZES, DrawnString, draw_string
 
 from groundstation.survey.adjustment.adjust import adjust_hole
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunders import Blunder, Examination, chance_of_one, examine_hole
-from groundstation.survey.adjustment.hypotheses import BlunderKind, Hypothesis
+from groundstation.survey.adjustment.hypotheses import Hypothesis
 from groundstation.survey.adjustment.looks import Looks
 from groundstation.survey.adjustment.reliability import measure_reliability
 from groundstation.survey.adjustment.toe_weights import toe_weights

@@ -16,8 +16,9 @@ from string_passes import Placed, inclination_deg, knowing, passes, survey
 from test_surveyed_biases import MILLI_G, STOPS, Drilled
 
 from groundstation.config import GroundConfig
-from groundstation.service.alarms.verdict import VerdictDoubt, Word, judge_hole
+from groundstation.service.alarms.verdict import judge_hole
 from groundstation.service.alarms.verdict_doubts import known_of
+from groundstation.service.alarms.verdict_words import VerdictDoubt, Word
 from groundstation.service.answers.model import RigModel
 from groundstation.service.hole.examined_hole import UNSOLVED
 from groundstation.survey.adjustment.tube_biases import bias_of_tube

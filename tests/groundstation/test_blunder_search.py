@@ -7,8 +7,9 @@ import pytest
 from string_passes import Placed, knowing, passes
 from test_adjusted_hole import ALIGNED, blamed, numbers_of
 
-from groundstation.service.alarms.verdict import VerdictDoubt
+from groundstation.ground_host import run_on_thread
 from groundstation.service.alarms.verdict_doubts import known_of
+from groundstation.service.alarms.verdict_words import VerdictDoubt
 from groundstation.service.answers.model import RigModel
 from groundstation.service.hole.examined_hole import UNEXPLAINED
 
@@ -39,7 +40,7 @@ def searched_through(model: RigModel) -> None:
 @pytest.fixture
 def apart(tmp_path: Path) -> Iterator[RigModel]:
     model = knowing(tmp_path, [], STOPS, **ALIGNED)
-    model.hole.search_apart()
+    model.hole.search_apart(run_on_thread)
     yield model
     search = model.hole._adjustment._search
     if search is not None:

@@ -20,9 +20,10 @@ from groundstation.report.plots_wall import band_of_thickness, joint_name, thinn
 from groundstation.survey.files.survey_records import DisplacementRule, read_record
 from groundstation.survey.fusion.fusion import POWERS, sequence_weights
 from groundstation.survey.tools.instruments import load_tool
-from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.as_built import Columns
 from groundstation.survey.wall.column_deviation import PRESETS, ColumnDesign
 from groundstation.survey.wall.column_joint import joint_thickness, probability_beyond
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.wall_joints import Joints, extra_column, judge_joints, neighbours_in_line, worst_joint
 from groundstation.survey.well.error_propagation import propagate_errors
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey

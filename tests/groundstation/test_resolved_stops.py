@@ -21,7 +21,7 @@ from groundstation.service.hole.station import StationStops
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Quality, angle_stds, direction_angles
 from groundstation.survey.fusion.shared import SharedErrors
-from groundstation.survey.fusion.survey_trust import Trust
+from groundstation.survey.fusion.trust_level import Trust
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 
 VAR = 1e-7

@@ -16,7 +16,7 @@ from groundstation.survey.fusion.fusion import Weighting
 LEAN_DEG, STOPS, TUBE_M = 2.0, 4, 2.0
 TOE_M = TUBE_M * (STOPS - 1)  # what the second tube has surveyed
 LEAN, DEG = math.radians(LEAN_DEG), math.radians(1.0)
-EXACTLY = {"depth_offset_std": 0.0, "tube_length_std": 0.0, "collar_inclination_deg": LEAN_DEG}
+EXACTLY = {"stick_up_std_m": 1e-9, "tube_length_std": 0.0, "collar_inclination_deg": LEAN_DEG}
 ALONG = np.array([math.sin(LEAN), 0.0, math.cos(LEAN)])
 Told = tuple[str, dict[str, object], npt.NDArray[np.float64]]
 OF_DEPTH: list[Told] = [
@@ -61,11 +61,11 @@ def test_the_toe_has_what_was_told_in_its_sigma(tmp_path: Path, weighting: Weigh
 
 def test_what_is_assumed_of_a_setup_is_what_the_sigma_has_in_it(tmp_path: Path) -> None:
     """The sigma of an item that was not told is that of the configuration, of which depths are made."""
-    rig = Rig(tmp_path, depth_offset_std=0.07, tube_length_std=0.004, depth_scale_std=3e-3)
+    rig = Rig(tmp_path, depth_offset_std=0.17, tube_length_std=0.004, depth_scale_std=3e-3)
     rig.run(5.0)
     rig.speak(2)
     shown = {row["item"]: row["sigma"] for row in rig.ask("setup")["items"]}
-    assert (shown["stick_up"], shown["length.1"], shown["depth_scale"]) == (0.07, 0.004, 3e-3)
+    assert (shown["stick_up"], shown["length.1"], shown["depth_scale"]) == (0.17, 0.004, 3e-3)
 
 
 @pytest.mark.parametrize(

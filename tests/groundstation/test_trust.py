@@ -17,11 +17,11 @@ from groundstation.survey.fusion.resolve import direction_angles, resolve_direct
 from groundstation.survey.fusion.survey_trust import (
     EFFECTS,
     UNKNOWN_YAW_VAR,
-    Trust,
     trust_of,
     with_uncertain_yaw,
     with_unknown_yaw,
 )
+from groundstation.survey.fusion.trust_level import Trust
 from telemetry.frozen import replace
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 

@@ -12,16 +12,14 @@ from scipy.stats import ncx2
 
 from groundstation.config import GroundConfig
 from groundstation.service.alarms.verdict import (
-    WINDS,
     HoleVerdict,
     Known,
-    VerdictDoubt,
-    Word,
     chance_text,
     compass_point,
     deviation_azimuth,
     judge_hole,
 )
+from groundstation.service.alarms.verdict_words import WINDS, VerdictDoubt, Word
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.rounding import round_to_std, rounded_std
 from groundstation.service.answers.shapes.answer_fields import fields_of_answer

@@ -61,9 +61,13 @@ def test_a_hole_in_which_all_fits_is_calm_and_its_uncertainty_opens_where_it_sta
         expect(page.locator("#parts")).to_contain_text("north, as it was told")
 
         page.locator("#unfound summary").click()
-        first = page.locator("#unfound-list li").first
-        expect(first).to_contain_text(re.compile("A step of the accelerometer of tube 1 is not found below .* mg"))
-        expect(first).to_contain_text("no other tube has read there")
+        steps = page.locator("#unfound-list li", has_text="step of the accelerometer")
+        expect(steps).to_have_count(1)  # of the tube where it does most: the one at the bit, alone at the last station
+        expect(steps).to_have_text(
+            re.compile(
+                r"A step of the accelerometer of tube 1 is (not found below|found from) [0-9.]+ mg.* the toe [0-9.]+ cm"
+            )
+        )
         page.evaluate(AXE)
         assert page.evaluate(FINDINGS) == []
         page.set_viewport_size({"width": 360, "height": 740})
@@ -84,7 +88,9 @@ def test_what_is_wrong_is_told_with_both_explanations_its_cost_and_what_to_do(tm
         assert found is not None, best
         size, sigma = map(float, found.groups())
         assert abs(size - STEP_MPS2 / 9.80665e-3) < 4.0 * sigma
-        expect(item.locator(".or")).to_contain_text(re.compile(r"or mount of tube 3 tilted by .* \(far less likely\)"))
+        expect(item.locator(".or")).to_contain_text(
+            re.compile(r"or mount of tube 3 tilted by .* \((far|some hundred times) less likely\)")
+        )
         expect(item.locator(".cost")).to_contain_text(re.compile(r"Not put right it would have the toe [0-9.]+ cm off"))
         expect(item.locator(".todo")).to_have_text(
             "Do: go on, it is put right; calibrate tube 3 or change it when it is out."

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from borechain.studies.drawn_rigs import TUBES, change_tables
-from groundstation.survey.adjustment.hypotheses import BlunderKind
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from sim.studies.scenarios import Tables
 
 MIDDLE_S: Final = 640.0  # after the start

@@ -16,42 +16,18 @@ itself, from a length z on: so it moves the end by up to k (L - z)^2 / 2 at the 
 
 from __future__ import annotations
 
-import enum
 import math
 from dataclasses import dataclass, replace
 
 from groundstation.service.alarms.spread_text import spread_text
+from groundstation.service.alarms.verdict_words import WINDS, VerdictDoubt, Word
 from groundstation.survey.wall.column_deviation import LEVELS, Deviation
 from groundstation.survey.wall.projected_end import REACHED, ProjectedEnd
 
 LOWEST, _, LIMIT = LEVELS  # of the tolerance, of what was drilled
 SURE = 0.95  # chance of ending within, from which on it is on target; a correction is to bring it there
 EVEN = 0.5  # chance below which it is more likely out than in
-WINDS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
 SURELY = 2.0  # standard deviations
-
-
-class Word(enum.StrEnum):
-    """What a crew needs to know first; the later the worse."""
-
-    ON_TARGET = "on_target"
-    WATCH = "watch"
-    STEER = "steer"
-    OUT = "out"
-    DONT_KNOW = "dont_know"
-
-
-class VerdictDoubt(enum.StrEnum):
-    """Reason of the verdict "don't know"."""
-
-    NO_SURVEY = "no_survey"
-    STALE = "stale"
-    DEPTH = "depth"
-    CLOCK = "clock"
-    YAW = "yaw"
-    UNCERTAIN = "uncertain"
-    SETUP = "setup"
-    CONTRADICTION = "contradiction"
 
 
 @dataclass(frozen=True, slots=True)

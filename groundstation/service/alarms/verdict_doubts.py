@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 from groundstation.config import GroundConfig
 from groundstation.service.alarms.rig_alarms import RigAlarms
-from groundstation.service.alarms.verdict import Known, VerdictDoubt
+from groundstation.service.alarms.verdict import Known
+from groundstation.service.alarms.verdict_words import VerdictDoubt
 from groundstation.service.hole.examined_hole import UNSOLVED
 from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.service.setup.readiness import told_briefly

@@ -15,7 +15,8 @@ from groundstation.service.string.known_string import KnownString
 from groundstation.service.string.message_numbers import Range
 from groundstation.survey.fusion.joint_angles import Pair, RestingYaw
 from groundstation.survey.fusion.shared_scale import shared_scale
-from groundstation.survey.fusion.survey_trust import Trust, trust_of
+from groundstation.survey.fusion.survey_trust import trust_of
+from groundstation.survey.fusion.trust_level import Trust
 from telemetry.application.seal_watch import CODE, refusal_of
 from telemetry.application.series import SERIES_SHIFT
 from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeMode, NodeState, SurveyMeasurement

@@ -33,13 +33,13 @@ from groundstation.service.answers.shapes.adjustment_shapes import (
     ToeShare,
 )
 from groundstation.service.answers.streamed_rows import Parameters
-from groundstation.service.hole.examined_hole import LEVEL, ExaminedHole, std_across
+from groundstation.service.hole.examined_hole import LEVEL, UNEXPLAINED, UNSOLVED, ExaminedHole, std_across
 from groundstation.service.setup.setup_priors import north_std
 from groundstation.service.setup.toe_costs import TURN_MOST
 from groundstation.survey.adjustment.blunder_cost import BlunderCost
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunder_words import STANDARD_GRAVITY, advise_crew, say_explanation, unit_of
 from groundstation.survey.adjustment.blunders import Blunder
-from groundstation.survey.adjustment.hypotheses import BlunderKind
 from groundstation.survey.adjustment.least_found import unfound_across, worst_of_kinds
 from groundstation.survey.adjustment.reliability import Reliability
 from groundstation.survey.adjustment.tube_biases import bias_of_tube
@@ -57,7 +57,8 @@ def answer_adjustment(k: RigModel, _p: Parameters) -> AdjustmentAnswer:
     """The adjustment as it stands; empty before the first survey below the collar."""
     examined, counts = k.hole.examined, k.hole.is_adjusted
     if examined is None:
-        return AdjustmentAnswer(0, 0.0, None, None, counts, NOTHING, None, None, 0, [], [], [], LEFT_OUT, [], [], None)
+        said = UNSOLVED if k.hole.is_unsolved else NOTHING
+        return AdjustmentAnswer(0, 0.0, None, None, counts, said, None, None, 0, [], [], [], LEFT_OUT, [], [], None)
     found, wrong = examined.adjusted, examined.examination.blunders
     budget = budget_of_toe(k, examined)
     return AdjustmentAnswer(
@@ -66,7 +67,7 @@ def answer_adjustment(k: RigModel, _p: Parameters) -> AdjustmentAnswer:
         misfit=examined.examination.global_ratio,
         play_deg=math.degrees(math.sqrt(found.now.play_var)),
         counts=counts,
-        said=say_fit(len(found.looks), len(wrong), len(examined.doubts)),
+        said=UNEXPLAINED if examined.is_open else say_fit(len(found.looks), len(wrong), len(examined.doubts)),
         toe_md_m=float(found.path.md[-1]),
         sigma_toe_cm=CM * std_across(np.sum([one.variances for one in budget], axis=0)),
         searched=examined.surveys,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunder_words import name_mistake, unit_of
-from groundstation.survey.adjustment.hypotheses import BlunderKind
 from groundstation.survey.adjustment.least_found import LARGEST, unfound_across
 from groundstation.survey.adjustment.reliability import Reliability
 

@@ -29,7 +29,7 @@ from groundstation.service.answers.streamed_rows import Parameters, is_streamed,
 from groundstation.service.answers.string_views import flag_names
 from groundstation.service.hole.resolved_stops import NO_NUMBER, ResolvedStops, forces_of
 from groundstation.survey.fusion.resolve import Quality, angle_stds_of_all, direction_angles
-from groundstation.survey.fusion.survey_trust import Trust
+from groundstation.survey.fusion.trust_level import Trust
 from telemetry.messages import NodeFlag
 
 DEGREES = 180.0 / math.pi  # in a radian

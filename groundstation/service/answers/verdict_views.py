@@ -12,7 +12,6 @@ from groundstation.service.alarms.verdict import (
     Deadline,
     HoleVerdict,
     Known,
-    Word,
     chance_text,
     compass_point,
     deviation_azimuth,
@@ -20,6 +19,7 @@ from groundstation.service.alarms.verdict import (
     missed_text,
 )
 from groundstation.service.alarms.verdict_doubts import known_of
+from groundstation.service.alarms.verdict_words import Word
 from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.rounding import round_to_std, rounded_std

@@ -20,7 +20,7 @@ from groundstation.service.answers.shapes.wall_shapes import (
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.hole.live_wall import LiveWall, Neighbourhood
 from groundstation.survey.fusion.resolve import direction_angles
-from groundstation.survey.wall.as_built import ColumnState
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.wall_columns import ColumnSurvey
 from groundstation.survey.wall.wall_joints import worst_depths
 from groundstation.survey.wall.wall_verdict import Judgement, joint_name

@@ -1,4 +1,4 @@
-"""The search for what is wrong with a hole, on a thread of its own: it takes longer than a question may wait.
+"""The search for what is wrong with a hole, beside the answers: it takes longer than a question may wait.
 
 Until it ends the hole is adjusted with what was found before, and it is said that something does not fit. What it ends
 with is what a search at once would have come to, so in the end it is the same however long it took.
@@ -6,8 +6,9 @@ with is what a search at once would have come to, so in the end it is the same h
 
 from __future__ import annotations
 
-import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,19 @@ from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.screen import is_suspicious
 
 Array = npt.NDArray[np.float64]
+
+
+class Running(Protocol):
+    """Something that is being done beside everything else, such as a thread."""
+
+    def is_alive(self) -> bool:
+        """Whether it is not done yet."""
+
+    def join(self) -> None:
+        """Wait until it is done."""
+
+
+RunApart = Callable[[Callable[[], None]], Running]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +60,11 @@ class Search:
     seen: LookedAt
     found: Examination | None = None  # None while it runs, and where the equations have no solution
     is_unexplained: bool = False  # whether something seems to be wrong and nothing explains it
-    thread: threading.Thread = field(init=False)
+    running: Running = field(init=False)
 
-    def begin(self) -> None:
+    def begin(self, run_apart: RunApart) -> None:
         """Start it."""
-        self.thread = threading.Thread(target=self._run, daemon=True)
-        self.thread.start()
+        self.running = run_apart(self._run)
 
     def _run(self) -> None:
         seen = self.seen
@@ -64,9 +77,15 @@ class Search:
 
 
 class BlunderSearch:
-    """Searches one after the other, of the newest surveys; its callers are on one thread."""
+    """Searches one after the other, of the newest surveys; its callers are on one thread.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    run_apart : does something beside everything else
+    """
+
+    def __init__(self, run_apart: RunApart) -> None:
+        self._run_apart = run_apart
         self._running: Search | None = None
         self._waiting: Search | None = None
         self._last: Search | None = None  # that has ended
@@ -92,14 +111,14 @@ class BlunderSearch:
     def _seek(self, search: Search) -> None:
         if self._running is None:
             self._running = search
-            search.begin()
+            search.begin(self._run_apart)
         elif self._running.number != search.number:
             self._waiting = search
 
     def take_found(self) -> tuple[int, ExaminedHole] | None:
         """What the search that has ended since the last call came to, with its number; None where none has."""
         done = self._running
-        if done is None or done.thread.is_alive():
+        if done is None or done.running.is_alive():
             return None
         self._running, waiting, self._waiting = None, self._waiting, None
         if waiting is not None:
@@ -112,7 +131,7 @@ class BlunderSearch:
     def wait(self) -> None:
         """Wait until the search that runs has ended."""
         if self._running is not None:
-            self._running.thread.join()
+            self._running.running.join()
 
 
 def goes_on(before: LookedAt, now: LookedAt) -> bool:

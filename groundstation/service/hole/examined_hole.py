@@ -10,10 +10,11 @@ import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunder_cost import BlunderCost, cost_blunders
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunder_words import say_blunder
 from groundstation.survey.adjustment.blunders import Blunder, Examination, chance_of_one
 from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, prior_shares, toe_budget
-from groundstation.survey.adjustment.hypotheses import BlunderKind, Hypothesis
+from groundstation.survey.adjustment.hypotheses import Hypothesis
 from groundstation.survey.adjustment.least_found import LARGEST, possible_mistakes
 from groundstation.survey.adjustment.next_stop import NextStop, plan_stop
 from groundstation.survey.adjustment.reliability import Reliability, measure_reliability

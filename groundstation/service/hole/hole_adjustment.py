@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.config import GroundConfig
-from groundstation.service.hole.blunder_search import BlunderSearch, LookedAt
+from groundstation.service.hole.blunder_search import BlunderSearch, LookedAt, RunApart
 from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import SAME_STOP
 from groundstation.service.hole.resolved_stops import ResolvedStops, Rows
@@ -26,8 +26,9 @@ from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import Packed, SharedErrors
 from groundstation.survey.fusion.sphere_direction import SphereDirection, tangent_errors
-from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR, Trust
+from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
+from groundstation.survey.fusion.trust_level import Trust
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
@@ -53,9 +54,9 @@ class HoleAdjustment:
         self._kept: tuple[bytes, StartingPoint] | None = None  # where an earlier adjustment ended, and of what looks
         self._hanging, self._met = Hanging(), set[int]()  # chains of which there was a stop
 
-    def search_apart(self) -> None:
-        """From now on look for what is wrong on a thread of its own."""
-        self._search = BlunderSearch()
+    def search_apart(self, run_apart: RunApart) -> None:
+        """From now on look for what is wrong beside everything else."""
+        self._search = BlunderSearch(run_apart)
 
     def take_found(self) -> tuple[int, ExaminedHole] | None:
         """What a search of its own came to since the last call, with the number of its newest survey."""

@@ -20,7 +20,7 @@ from groundstation.service.hole.history import SAME_STOP
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
 from groundstation.survey.adjustment.blunders import Blunder
-from groundstation.survey.adjustment.hypotheses import BlunderKind
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.fusion.fusion import DEPARTED, Evidence, departures_from, judge_departure
 
 

@@ -14,7 +14,8 @@ from groundstation.service.setup.setup_items import accelerometer_std
 from groundstation.service.string.known_string import KnownString
 from groundstation.service.string.stored import Stored
 from groundstation.survey.fusion.shared import SharedErrors
-from groundstation.survey.fusion.survey_trust import Trust, trust_of
+from groundstation.survey.fusion.survey_trust import trust_of
+from groundstation.survey.fusion.trust_level import Trust
 from telemetry.messages import SurveyMeasurement
 
 UNTRUSTED = "survey_untrusted"  # alarm: a measurement is fused with an unknown yaw

@@ -17,7 +17,8 @@ import numpy.typing as npt
 from groundstation.survey.fusion.fusion import Stack
 from groundstation.survey.fusion.resolve import Direction, Quality
 from groundstation.survey.fusion.shared import CAUSES, Places, columns_of, weights_of
-from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR, Trust
+from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
+from groundstation.survey.fusion.trust_level import Trust
 from telemetry.messages import NodeFlag
 
 Array = npt.NDArray[np.float64]

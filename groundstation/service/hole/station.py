@@ -13,7 +13,8 @@ import numpy.typing as npt
 from groundstation.service.hole.resolved_stops import ResolvedStop, ResolvedStops, Rows
 from groundstation.survey.fusion.fusion import Departure, GrowingBayes, Stack, Weighting, departure_from, fuse_by_scheme
 from groundstation.survey.fusion.resolve import Direction
-from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR, Trust
+from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
+from groundstation.survey.fusion.trust_level import Trust
 
 
 class StationStops:

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.config import GroundConfig
+from groundstation.service.hole.blunder_search import RunApart
 from groundstation.service.hole.deviation_alarms import AlarmList
 from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import History, Moment
@@ -31,9 +32,9 @@ from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
-from groundstation.survey.fusion.survey_trust import Trust
 from groundstation.survey.fusion.tangents import tangents_of
 from groundstation.survey.fusion.transport import Carried, carry_directions
+from groundstation.survey.fusion.trust_level import Trust
 from groundstation.survey.path.curvature_tendency import CurvatureTendency, learn_curvature
 from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.wall.column_deviation import Deviations, axis_deviations
@@ -59,7 +60,7 @@ class SurveyedHole:
         self._config = config
         self._shared = shared
         self._setup = setup
-        self._searches_apart = False
+        self._run_apart: RunApart | None = None
         self._is_adjusted = config.weighting is Weighting.ADJUSTED
         self._design = config.design
         self.version = 0  # grows with every survey
@@ -87,8 +88,8 @@ class SurveyedHole:
         self._moved: list[Moved] = []  # of the adjusted hole
         self._surveyed_back: list[float] = []  # m, in it
         self._adjustment = HoleAdjustment(self._config, self._shared)
-        if self._searches_apart:
-            self._adjustment.search_apart()
+        if self._run_apart is not None:
+            self._adjustment.search_apart(self._run_apart)
         self._examined: tuple[int, ExaminedHole | None] = (0, None)  # of the version that it is of
         self._is_unsolved = False
         self._adjusted: dict[float, Direction] = {}  # by the depth (m) of a station, where the hole is adjusted
@@ -133,10 +134,10 @@ class SurveyedHole:
         self._newest_at = max(self._newest_at, at)
         return True
 
-    def search_apart(self) -> None:
-        """From now on look for what is wrong on a thread of its own, so that no question waits for it."""
-        self._searches_apart = True
-        self._adjustment.search_apart()
+    def search_apart(self, run_apart: RunApart) -> None:
+        """From now on look for what is wrong beside everything else, so that no question waits for it."""
+        self._run_apart = run_apart
+        self._adjustment.search_apart(run_apart)
 
     def adopt_found(self) -> bool:
         """Take over what a search of its own has found since the last time; whether it has."""

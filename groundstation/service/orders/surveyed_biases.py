@@ -10,7 +10,7 @@ import numpy as np
 from groundstation.config import SENSOR_BIAS_DEG, GroundConfig
 from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.survey.fusion.force_biases import Look, SurveyedBiases, look_of, solve_biases
-from groundstation.survey.fusion.survey_trust import Trust
+from groundstation.survey.fusion.trust_level import Trust
 from telemetry.messages import NodeState
 
 GRAVITY_STD = 2e-3  # m/s^2, of what is entered for the site

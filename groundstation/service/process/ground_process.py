@@ -18,6 +18,7 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.revisions import BEATS
 from groundstation.service.disk.ground_store import Store
 from groundstation.service.disk.keeper import StringKeeper, refusing_disk
+from groundstation.service.hole.blunder_search import RunApart
 from groundstation.service.orders.order_book import SentOrder
 from groundstation.service.orders.uploads import Uploads
 from groundstation.service.process.intake_tape import DEPTH, MESSAGE, ORDER, TIMER, Tape
@@ -85,8 +86,8 @@ class GroundProcess(Process):
     config : validated settings
     lot : number below its argument by lot; a simulated rig draws from its seed
     disk : that holds the database
-    searches_apart : what is wrong with the hole is looked for on a thread of its own: by a clock of its own no question
-        is to wait for it; where it is stepped, what is answered is the same at the same step every time
+    run_apart : does something beside everything else, such as the search for what is wrong with the hole: by a clock of
+        its own no question is to wait for it; without it what is answered is the same at the same step every time
 
     Raises
     ------
@@ -102,7 +103,7 @@ class GroundProcess(Process):
         lot: Callable[[int], int] = secrets.randbelow,
         disk: Disk = MACHINE,
         *,
-        searches_apart: bool = False,
+        run_apart: RunApart | None = None,
     ) -> None:
         self.config = config
         seals = None
@@ -115,8 +116,8 @@ class GroundProcess(Process):
         # by lot, not counted: a database that was deleted or restored must not repeat a number that the string has seen
         start = 1 + lot(STARTS)
         self.model = model = RigModel.begin(config)
-        if searches_apart:
-            model.hole.search_apart()
+        if run_apart is not None:
+            model.hole.search_apart(run_apart)
         self._string = model.string
         self.watch = Watch(model.string, model.hole, model.placement, model.rig_alarms, config.stale_after)
         self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=start, seals=seals)

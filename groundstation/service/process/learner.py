@@ -129,7 +129,7 @@ class Learner:
             **dict.fromkeys(ONCE_RESTED, self._has_rested()),
         }
         changed = [path for path, has_changed in paths.items() if has_changed]
-        return sorted({*changed, *self._by_survey, "alarms"}) if is_explained else changed
+        return sorted({*changed, *self._by_survey, *ONCE_RESTED, "alarms"}) if is_explained else changed
 
     def _has_rested(self) -> bool:
         """Whether no survey has come since the last look, and some before."""

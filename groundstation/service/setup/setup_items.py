@@ -7,14 +7,21 @@ set up, and an IMU sits in its tube as well as it was mounted.
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from groundstation.config import SENSOR_BIAS_DEG, GroundConfig
 from groundstation.service.setup.setup_book import Pair, SetupBook
-from groundstation.service.setup.told_value import CONFIGURATION, DRIVE, SetupKind, ToldValue, item_name, joint_subject
+from groundstation.service.setup.told_value import (
+    CONFIGURATION,
+    DRIVE,
+    SetupKind,
+    SetupSource,
+    ToldValue,
+    item_name,
+    joint_subject,
+)
 from groundstation.service.string.known_string import KnownString
 from telemetry.messages import UNKNOWN_YAW_STD
 
@@ -27,15 +34,6 @@ GRAVITY_STD = 2e-3  # m/s^2, of what is entered for the site
 ALONG = (SetupKind.LENGTH, SetupKind.STICK_UP, SetupKind.DEPTH_SCALE)  # errors of the depth
 BARE = "bare sensor"
 GYROSCOPE_BIAS_STD = 0.02 * DEG  # rad/s; a node measures its own at rest
-
-
-class SetupSource(enum.StrEnum):
-    """Where the value of an item is from."""
-
-    TOLD = "told"  # by an order, the configuration, or to a node
-    MEASURED = "measured"
-    DESIGN = "design"  # of the hole or of the tubes
-    DEFAULT = "default"  # of this program
 
 
 @dataclass(frozen=True, slots=True)

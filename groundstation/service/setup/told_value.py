@@ -34,6 +34,15 @@ class SetupKind(enum.StrEnum):
     GRAVITY = "gravity"
 
 
+class SetupSource(enum.StrEnum):
+    """Where the value of an item is from."""
+
+    TOLD = "told"  # by an order, the configuration, or to a node
+    MEASURED = "measured"
+    DESIGN = "design"  # of the hole or of the tubes
+    DEFAULT = "default"  # of this program
+
+
 SUBJECTS: Final = {
     SetupKind.JOINT: re.compile(r"([0-9]{1,3}|drive)-[0-9]{1,3}"),
     SetupKind.LENGTH: re.compile(r"[0-9]{1,3}"),

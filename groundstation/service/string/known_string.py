@@ -15,7 +15,8 @@ from groundstation.service.string.stands import take_stand, take_survey
 from groundstation.service.string.stops import Stops
 from groundstation.service.string.tally import Tally
 from groundstation.survey.fusion.joint_angles import JointAngles
-from groundstation.survey.fusion.survey_trust import Trust, trust_of
+from groundstation.survey.fusion.survey_trust import trust_of
+from groundstation.survey.fusion.trust_level import Trust
 from telemetry.messages import EPOCH_UNKNOWN, DepthReading, Event, NodeState, Stand, StaticRecord, SurveyMeasurement
 
 EVENTS_KEPT = 10_000

@@ -89,12 +89,12 @@ def adjust_hole(
             tried = [*tried, (now.play_var, play)] if solution.step < NEAR else []
             now = replace(now, play_var=faster_play(tried) if tried else play)
         if again and not is_bent:
-            of_hole, of_legs = part_of_way(now.curvature_var, whole), part_of_way(now.leg_vars, legs)
-            now = replace(now, curvature_var=float(of_hole), leg_vars=of_legs)
+            between = part_of_way(np.append(now.leg_vars, now.curvature_var), np.append(legs, whole))
+            now = replace(now, curvature_var=float(between[-1]), leg_vars=between[:-1])
     return found
 
 
-def part_of_way(before: Array | float, after: Array | float) -> Array:
+def part_of_way(before: Array, after: Array) -> Array:
     """Most of the way from variances to others, by their logarithms, for a whole step goes too far."""
     return np.asarray(before * (after / before) ** PART)
 

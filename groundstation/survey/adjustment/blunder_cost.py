@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunders import Blunder, Examination
 from groundstation.survey.adjustment.taken_in import places_among_further
 from groundstation.survey.adjustment.toe_weights import toe_weights
@@ -35,7 +36,10 @@ class BlunderCost:
 
 
 def cost_blunders(examination: Examination) -> list[BlunderCost | None]:
-    """Cost of every blunder that was found; None of one whose size is known, which costs nothing."""
+    """Cost of every blunder that was found; None of one that is no further unknown.
+
+    That is what has a known size, and a collar that was told wrong.
+    """
     found = examination.adjusted
     _, common = found.cofactor(toe_weights(found), np.zeros((len(found.common_cov), 3)))
     taken_in, width = examination.taken_in, found.string.width
@@ -50,9 +54,10 @@ def cost_blunders(examination: Examination) -> list[BlunderCost | None]:
 
 def _cost_of(blunder: Blunder, at: Places, shared: Array, cov: Array) -> BlunderCost | None:
     """Cost of a blunder at these further unknowns: its own first, then those of the second of a doubt."""
-    if not len(at):
+    width = len(blunder.best.size)
+    if not width or len(at) < width or blunder.best.hypothesis.kind is BlunderKind.COLLAR_WRONG:
         return None
     by_size = np.linalg.solve(cov[np.ix_(at, at)], shared[at])
     size = np.zeros(len(at))
-    size[: len(blunder.best.size)] = blunder.best.size
+    size[:width] = blunder.best.size
     return BlunderCost(size @ by_size, np.einsum("qr,qr->r", shared[at], by_size))

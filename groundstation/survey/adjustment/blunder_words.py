@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunders import Blunder, Explanation
-from groundstation.survey.adjustment.hypotheses import BY_DEPTH, OF_FORCE, BlunderKind, Hypothesis
+from groundstation.survey.adjustment.hypotheses import BY_DEPTH, OF_FORCE, Hypothesis
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 
 Array = npt.NDArray[np.float64]

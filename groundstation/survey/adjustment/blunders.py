@@ -16,15 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.collar import collar_departure
-from groundstation.survey.adjustment.hypotheses import (
-    BY_DEPTH,
-    KNOWN_SIZE,
-    WIDTHS,
-    BlunderKind,
-    Hypothesis,
-    all_hypotheses,
-)
+from groundstation.survey.adjustment.hypotheses import BY_DEPTH, KNOWN_SIZE, WIDTHS, Hypothesis, all_hypotheses
 from groundstation.survey.adjustment.looks import Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.scores import Score, log_chances, log_tail, score_hypotheses

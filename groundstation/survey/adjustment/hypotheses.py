@@ -10,12 +10,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import StrEnum, auto
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Linearised
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.looks import Looks, StartingPoint
 from groundstation.survey.adjustment.run_of_stops import JOINT, RunOfStops
 
@@ -25,29 +25,6 @@ SHORT = 0.05  # m, over which a hole has one curvature
 FEWEST_TO_CREEP = 2  # looks after the last right one; with one it is a step
 MOST_MOVED = 4  # neighbouring stations that move together
 RECENT, EARLIER = 16, 8  # stops from which on, where there are more than both
-
-
-class BlunderKind(StrEnum):
-    """What may be wrong."""
-
-    BIAS_STEPPED = auto()
-    BIAS_CREEPS = auto()
-    BIAS_WRONG = auto()
-    TILT_SLIPPED = auto()
-    TILT_WRONG = auto()
-    MOUNT_TURNED = auto()
-    MOUNT_MISREAD = auto()
-    JOINT_SLIPPED = auto()
-    JOINT_MISREAD = auto()
-    ENCODER_SLIPPED = auto()
-    ENCODER_DRIFTS = auto()
-    HOLE_MOVED = auto()
-    DEPTH_WRONG_ONCE = auto()
-    DEPTH_WRONG_FROM = auto()
-    AXES_EXCHANGED = auto()
-    TUBES_EXCHANGED = auto()
-    LOOK_WRONG = auto()
-    COLLAR_WRONG = auto()
 
 
 K = BlunderKind

@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from groundstation.survey.adjustment.hypotheses import BlunderKind, Hypothesis
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
+from groundstation.survey.adjustment.hypotheses import Hypothesis
 from groundstation.survey.adjustment.looks import Looks
 from groundstation.survey.adjustment.reliability import Reliability
 from groundstation.survey.adjustment.run_of_stops import JOINT, RunOfStops

@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, BlunderKind, Hypothesis, effect_of
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
+from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, Hypothesis, effect_of
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.scores import MOST_AT_ONCE, UNTOLD, free_information
 from groundstation.survey.adjustment.toe_weights import moved_looks

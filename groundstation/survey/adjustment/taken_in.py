@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjust import adjust_hole, linearise_all
 from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.collar import untold_collar
 from groundstation.survey.adjustment.curvature_size import curvature_deviance
 from groundstation.survey.adjustment.equations import path_equations, string_departure
@@ -28,7 +29,6 @@ from groundstation.survey.adjustment.hypotheses import (
     OF_FORCE,
     SWAPPED,
     WIDTHS,
-    BlunderKind,
     Hypothesis,
     effect_amplitudes,
     effect_of,

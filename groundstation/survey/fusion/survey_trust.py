@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from enum import IntEnum
 from functools import cache, reduce
 from operator import or_
 
@@ -23,20 +22,12 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.fusion.resolve import Resolved
+from groundstation.survey.fusion.trust_level import Trust
 from telemetry.messages import NodeFlag
 
 Array = npt.NDArray[np.float64]
 UNKNOWN_YAW_VAR = math.pi**2 / 3.0  # rad^2, uniform on the circle, as nodes say it (``telemetry.messages``)
 ALONG, ACROSS = 1.5, UNKNOWN_YAW_VAR  # of the squared lean
-
-
-class Trust(IntEnum):
-    """Trust in a survey; the larger number is the stricter."""
-
-    FULL = 0  # as its variances say
-    UNKNOWN_YAW = 1  # fused with the variance of an unknown yaw, beside no survey that is trusted
-    SET_ASIDE = 2  # kept and shown, never fused
-    UNDATED = 3  # its time is not rig time, so it has no depth
 
 
 EFFECTS: dict[NodeFlag, Trust] = {

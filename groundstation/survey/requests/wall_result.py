@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from groundstation.survey.requests.survey_rows import COORDINATES
-from groundstation.survey.wall.as_built import ColumnState
 from groundstation.survey.wall.column_deviation import point_deviation
 from groundstation.survey.wall.column_joint import shift_margin
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.wall_columns import state_words
 from groundstation.survey.wall.wall_file import Wall
 from groundstation.survey.wall.wall_joints import ExtraColumn, Joints, worst_depths, worst_joint

@@ -7,25 +7,16 @@ last survey) or missing. Frame: two axes in the plane (north and east where the 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import IntEnum
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.wall.column_deviation import ColumnDesign
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.plane_errors import PlaneErrors
 
 Array = npt.NDArray[np.float64]
 TOE = 0.05  # m, by which a column may end above the depth asked for: its last leg goes on
-
-
-class ColumnState(IntEnum):
-    """State of a column at a depth."""
-
-    SURVEYED = 0
-    UNSURVEYED = 1  # drilled, but below its last survey: extrapolated
-    MISSING = 2  # planned, not drilled, or below the end of the column: an opening
-    OUTSIDE = 3  # above the head or below the toe of its design: nothing is required
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,9 @@ from datetime import date
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.as_built import Columns
 from groundstation.survey.wall.column_joint import joint_thickness
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.wall_joints import Detour, joint_asked
 
 Array = npt.NDArray[np.float64]

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.as_built import Columns
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.voids import power_centre
 from groundstation.survey.wall.wall_errors import (
     FURTHEST,

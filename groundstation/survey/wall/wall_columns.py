@@ -17,15 +17,9 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import PropagationMode, SurveyTool
-from groundstation.survey.wall.as_built import (
-    TOE,
-    Columns,
-    ColumnState,
-    covariance_roots,
-    intersect_planes,
-    plane_frame,
-)
+from groundstation.survey.wall.as_built import TOE, Columns, covariance_roots, intersect_planes, plane_frame
 from groundstation.survey.wall.column_deviation import ColumnDesign
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.plane_errors import PlaneErrors
 from groundstation.survey.wall.tight_depths import TightRange
 from groundstation.survey.well.ellipsoid import check_covariance

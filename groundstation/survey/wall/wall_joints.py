@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.as_built import Columns
 from groundstation.survey.wall.column_joint import joint_thickness, largest_distance, probability_thin
+from groundstation.survey.wall.column_state import ColumnState
 
 Array = npt.NDArray[np.float64]
 AT_ONCE = 64  # joints that are judged together

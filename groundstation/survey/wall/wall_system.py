@@ -20,8 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.as_built import Columns
 from groundstation.survey.wall.column_joint import limit_distances
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.void_chance import VOID_DEPTHS, near_triple, void_open, void_point
 from groundstation.survey.wall.wall_errors import (
     Mixture,

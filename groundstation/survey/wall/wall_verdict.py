@@ -13,8 +13,9 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.as_built import Columns
 from groundstation.survey.wall.column_joint import limit_distances
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.void_chance import VoidChance, void_chance
 from groundstation.survey.wall.voids import Void, find_voids, triples_of
 from groundstation.survey.wall.wall_joints import (

@@ -12,9 +12,10 @@ from drawn_strings import DEG, MG, DrawnString, draw_string
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunder_cost import cost_blunders
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
+from groundstation.survey.adjustment.blunder_words import ADVICE, MISTAKES
 from groundstation.survey.adjustment.blunders import examine_hole
-from groundstation.survey.adjustment.hypotheses import BlunderKind
-from groundstation.survey.adjustment.least_found import possible_mistakes, unfound_across, worst_of_kinds
+from groundstation.survey.adjustment.least_found import LARGEST, possible_mistakes, unfound_across, worst_of_kinds
 from groundstation.survey.adjustment.looks import Looks
 from groundstation.survey.adjustment.reliability import measure_reliability
 from groundstation.survey.adjustment.toe_weights import leg_weights, toe_weights
@@ -72,6 +73,13 @@ def test_the_worst_mistake_of_each_kind_comes_first_and_none_is_larger_than_it_m
         assert unfound_across(one) <= next(
             cost for kind, cost in zip(kinds, costs, strict=True) if kind is one.hypothesis.kind
         )
-    # the tube at the bit alone has read the last station: its step is the one that is found last
-    steps = {one.hypothesis.subject: one.smallest for one in told if one.hypothesis.kind is BlunderKind.BIAS_STEPPED}
-    assert max(steps, key=lambda subject: steps[subject]) == (0,)
+    # the tube at the bit alone has read the last station: its step is the one that does most
+    (step,) = (one for one in worst if one.hypothesis.kind is BlunderKind.BIAS_STEPPED)
+    assert step.hypothesis.subject == (0,)
+
+
+def test_every_kind_has_its_advice_and_every_possible_mistake_its_name_and_size() -> None:
+    drawn = draw_string(5)
+    assert set(ADVICE) == set(BlunderKind)
+    kinds = {one.kind for one in possible_mistakes(drawn.looks, drawn.run)}
+    assert kinds == set(MISTAKES) == set(LARGEST)

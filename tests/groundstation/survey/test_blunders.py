@@ -14,11 +14,11 @@ from drawn_strings import DEG, MG, SIZES, DrawnString, draw_string
 from scipy.stats import f as f_distribution
 
 from groundstation.survey.adjustment.adjust import adjust_hole
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunder_words import SENTENCES, say_blunder
 from groundstation.survey.adjustment.blunders import examine_hole
 from groundstation.survey.adjustment.hypotheses import (
     OF_FORCE,
-    BlunderKind,
     Hypothesis,
     all_hypotheses,
     effect_amplitudes,

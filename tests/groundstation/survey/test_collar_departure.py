@@ -10,9 +10,9 @@ from blame_table import examined
 from drawn_strings import DEG, DrawnString, draw_string
 
 from groundstation.survey.adjustment.adjust import adjust_hole
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunder_words import say_blunder
 from groundstation.survey.adjustment.collar import collar_departure
-from groundstation.survey.adjustment.hypotheses import BlunderKind
 from groundstation.survey.adjustment.looks import PathPrior
 
 NAMES = [str(tube + 1) for tube in range(10)]

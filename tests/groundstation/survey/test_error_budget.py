@@ -13,9 +13,10 @@ from scipy.stats import chi2, ncx2
 
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunders import chance_of_one
 from groundstation.survey.adjustment.budget import ShareSource, error_budget, toe_budget
-from groundstation.survey.adjustment.hypotheses import BlunderKind, Hypothesis, all_hypotheses
+from groundstation.survey.adjustment.hypotheses import Hypothesis, all_hypotheses
 from groundstation.survey.adjustment.looks import Looks
 from groundstation.survey.adjustment.next_stop import plan_stop
 from groundstation.survey.adjustment.reliability import Reliability, least_noncentrality, measure_reliability

@@ -13,7 +13,7 @@ from groundstation.survey.requests.survey_answer import answer_survey
 from groundstation.survey.requests.survey_request import FrameRequest, SurveyRequest
 from groundstation.survey.requests.survey_tables import station_table_text
 from groundstation.survey.requests.wall_result import wall_result
-from groundstation.survey.wall.as_built import ColumnState
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.judged_wall import judge_wall
 from groundstation.survey.wall.wall_file import read_wall
 

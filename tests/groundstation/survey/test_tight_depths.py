@@ -8,8 +8,8 @@ import pytest
 
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import load_tool
-from groundstation.survey.wall.as_built import ColumnState
 from groundstation.survey.wall.column_deviation import ColumnDesign
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.judged_wall import judge_wall
 from groundstation.survey.wall.tight_depths import TightRange
 from groundstation.survey.wall.wall_columns import Assumptions, ColumnPlan, ColumnSurvey, build_wall

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from walls_by_sampling import uncovered
 
-from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.as_built import Columns
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.plane_errors import PlaneErrors
 from groundstation.survey.wall.void_chance import void_chance, void_open
 from groundstation.survey.wall.voids import power_centre, triples_of

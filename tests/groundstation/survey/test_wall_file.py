@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from groundstation.errors import SurveyError
-from groundstation.survey.wall.as_built import ColumnState
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.judged_wall import judge_wall
 from groundstation.survey.wall.wall_file import Wall, read_wall
 from groundstation.survey.wall.wall_verdict import FindingKind, Judgement, WallVerdict

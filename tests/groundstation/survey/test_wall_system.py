@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from walls_by_sampling import joint_thickness, uncovered
 
-from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.as_built import Columns
 from groundstation.survey.wall.column_joint import largest_distance, probability_beyond, probability_thin
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.plane_errors import PlaneErrors
 from groundstation.survey.wall.voids import triples_of
 from groundstation.survey.wall.wall_joints import (

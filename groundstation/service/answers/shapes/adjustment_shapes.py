@@ -6,7 +6,7 @@ from typing import Annotated
 
 from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
 from groundstation.service.answers.shapes.string_shapes import Tube
-from groundstation.survey.adjustment.hypotheses import BlunderKind
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
 
 Name = Annotated[str, "what it is of, such as a tube; empty of all"]
 
@@ -27,7 +27,7 @@ class BlunderRow:
     misfit_after: Annotated[float, "of all surveys with it"]
     best: Annotated[str, "best explanation in words"]
     second: Annotated[str | None, "second best in words, and how likely it is beside the best"]
-    moved_cm: Annotated[float | None, "by which the toe would be elsewhere were it not put right; null of a known size"]
+    moved_cm: Annotated[float | None, "by which the toe would be elsewhere without it put right; null if not known"]
     sigma_cm: Annotated[float | None, "standard deviation that it adds at the toe, since its size is not known exactly"]
     todo: Annotated[str, "what to do about it"]
 

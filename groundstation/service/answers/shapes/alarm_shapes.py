@@ -6,7 +6,7 @@ from typing import Annotated
 
 from groundstation.service.alarms.crew_alarms import AlarmState
 from groundstation.service.alarms.rig_alarms import KINDS, Level
-from groundstation.service.alarms.verdict import WINDS
+from groundstation.service.alarms.verdict_words import WINDS
 from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
 from groundstation.service.answers.shapes.hole_shapes import MeasuredDepth
 

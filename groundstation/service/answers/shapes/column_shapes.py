@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from groundstation.service.alarms.verdict import WINDS, VerdictDoubt, Word
+from groundstation.service.alarms.verdict_words import WINDS, VerdictDoubt, Word
 from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
 from groundstation.service.answers.shapes.hole_shapes import MeasuredDepth
 

@@ -15,7 +15,7 @@ from groundstation.service.answers.shapes.string_shapes import (
     Yaw,
     YawSigma,
 )
-from groundstation.survey.fusion.survey_trust import Trust
+from groundstation.survey.fusion.trust_level import Trust
 
 MeasuredDepth = Annotated[float, "measured depth"]
 StationNumber = Annotated[int, "number, from the collar down"]

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
-from groundstation.service.setup.setup_items import SetupSource
-from groundstation.service.setup.told_value import SetupKind
+from groundstation.service.setup.told_value import SetupKind, SetupSource
 
 
 @answer_class

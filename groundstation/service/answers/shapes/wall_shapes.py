@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
-from groundstation.survey.wall.as_built import ColumnState
+from groundstation.survey.wall.column_state import ColumnState
 
 OfHead = Annotated[float, "of its head"]
 JointState = Annotated[str, "the worst along it", OneOf(*(state.name.lower() for state in ColumnState))]

@@ -398,7 +398,7 @@ export interface BlunderRow {
   best: string;
   /** second best in words, and how likely it is beside the best */
   second: string | null;
-  /** by which the toe would be elsewhere were it not put right; null of a known size */
+  /** by which the toe would be elsewhere without it put right; null if not known */
   moved_cm: number | null;
   /** standard deviation that it adds at the toe, since its size is not known exactly */
   sigma_cm: number | null;
