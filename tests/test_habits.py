@@ -21,7 +21,7 @@ from sim.studies.study_table import STUDIES
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "docs" / "results"
-KEPT = [*STUDIES.values(), RIG_STUDIES["set-up"]]  # whose tables stand there
+KEPT = [*STUDIES.values(), *RIG_STUDIES.values()]  # whose tables stand there
 DECISIONS = ROOT / "docs" / "decisions"
 MOST_PARAMETERS, MOST_LINES = 10, 40  # of the function of a command
 

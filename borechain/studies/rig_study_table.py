@@ -79,7 +79,7 @@ RIG_STUDIES: Final = by_name(
             ),
             counts="rigs",
             drawn=False,
-            full=("--seeds 4 --honest 300",),
+            full=("--seeds 3 --honest 60",),
             short="--seeds 1 --honest 1",
         ),
     ],

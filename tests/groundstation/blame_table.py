@@ -23,7 +23,7 @@ from groundstation.survey.adjustment.reliability import measure_reliability
 from groundstation.survey.adjustment.toe_weights import toe_weights
 
 K = BlunderKind
-OF_STRING = (K.DEPTH_WRONG_ONCE, K.DEPTH_WRONG_FROM, K.ENCODER_SLIPPED, K.HOLE_MOVED)
+OF_STRING = (K.DEPTH_WRONG_ONCE, K.DEPTH_WRONG_FROM, K.ENCODER_SLIPPED, K.ENCODER_DRIFTS, K.HOLE_MOVED)
 
 
 def examined(drawn: DrawnString) -> Examination:

@@ -35,6 +35,7 @@ SIZES = {
     "axes_exchanged": (1.0,),
     "tubes_exchanged": (1.0,),
     "look_wrong": (4.0, 12.0, 50.0),  # mg
+    "encoder_drifts": (0.3, 1.0, 7.2),  # deg a stop
 }
 
 
@@ -110,6 +111,8 @@ def draw_string(
                 or kind == "encoder_slipped"
             ):
                 told += sign * size * DEG
+            if kind == "encoder_drifts":
+                told += sign * size * DEG * stop
             if since and kind == "tilt_slipped" and one == tube:
                 tilt = tilt + across * size * DEG
             force = read_force(d, psi, tilt, gravity) + biases[one] + rng.normal(0.0, 2e-4, 3)

@@ -63,5 +63,5 @@ def test_a_depth_that_stood_still_is_a_doubt_and_a_wrong_collar_is_named() -> No
     stuck = run_rig(BlunderJob(draw, places["depth stuck"], 0)).answer
     assert stuck.word == "dont_know"
     assert "depth_contradicts" in stuck.alarms
-    collar = run_rig(BlunderJob(draw, places["collar wrong"], 1)).answer
+    collar = run_rig(BlunderJob(draw, places["collar wrong"], 2)).answer
     assert collar.causes == ("collar_wrong",)

@@ -28,6 +28,7 @@ from sim.world.world import World
 USUAL: Final = KnownSetUp()
 BEYOND: Final = 3.0  # standard deviations
 FALSELY_BLAMED: Final = 0.001  # of honest holes, at most
+ENOUGH: Final = 3000  # honest holes: that none of them is blamed tells that with 95 %
 HONEST: Final = "honest"
 
 
@@ -116,7 +117,7 @@ def blunder_row(kind: PlantedBlunder, size: int, runs: Sequence[BlunderRun]) -> 
         "beyond_on_target": on_target,
         "worst_sigmas": float(np.median([run.worst for run in runs])),
         "direction_sigmas": float(np.median([run.direction for run in runs])),
-        "toe_mm": float(np.nanmedian([run.toe_mm for run in runs])),
+        "toe_mm": median_toe(runs),
         "causes": most_common_causes(runs),
         "seen_by": kind.seen_by,
     }
@@ -137,10 +138,16 @@ def honest_row(runs: Sequence[BlunderRun]) -> dict[str, Any]:
         "beyond_on_target": sum(run.answer.word == "on_target" for run in beyond),
         "worst_sigmas": float(np.median([run.worst for run in runs])),
         "direction_sigmas": float(np.median([run.direction for run in runs])),
-        "toe_mm": float(np.nanmedian([run.toe_mm for run in runs])),
+        "toe_mm": median_toe(runs),
         "causes": most_common_causes(runs),
         "seen_by": "",
     }
+
+
+def median_toe(runs: Sequence[BlunderRun]) -> float | None:
+    """Median error of the toe, mm; None where no hole was surveyed."""
+    found = [run.toe_mm for run in runs if math.isfinite(run.toe_mm)]
+    return float(np.median(found)) if found else None
 
 
 def most_common_causes(runs: Sequence[BlunderRun]) -> str:
@@ -158,6 +165,8 @@ def verdict_lines(result: dict[str, Any]) -> list[str]:
     checks = sorted({row["seen_by"] for row in rows if row["unseen"]})
     share = result["blamed"] / result["honest"]
     word = "holds" if share <= FALSELY_BLAMED else "is missed"
+    if share <= FALSELY_BLAMED and result["honest"] < ENOUGH:
+        word = f"takes {ENOUGH} to tell"
     return [
         f"{len({row['case'] for row in rows})} kinds: {missed} of {sum(row['rigs'] for row in rows)} rigs beyond "
         f"{BEYOND:g} standard deviations without a word, {wrong} of them or others ON TARGET; 0 expected",

@@ -29,6 +29,7 @@ SOURCE_NAMES = {
     ShareSource.BIAS: "accelerometer_bias", ShareSource.TILT: "mounts", ShareSource.COLLAR: "collar",
     ShareSource.PATH: "path",
 }  # fmt: skip
+UNEVEN = (BlunderKind.ENCODER_DRIFTS,)  # whose size is one for all stops, and not quite so
 UNEXPLAINED = "the newest surveys contradict those before; what is wrong is being looked for"
 UNSOLVED = (
     "the surveys cannot be adjusted to each other, so every station stands for itself and nothing is found that is "
@@ -66,8 +67,9 @@ class ExaminedHole:
 
     @property
     def doubts(self) -> list[str]:
-        """Sentences of what may be one thing or another."""
-        found = [self.sentence(one) for one in self.examination.blunders if one.is_doubt]
+        """Sentences of what may be one thing or another, or goes on by no two stops alike, as a belt that slips."""
+        blunders = self.examination.blunders
+        found = [self.sentence(one) for one in blunders if one.is_doubt or one.best.hypothesis.kind in UNEVEN]
         return [*found, UNEXPLAINED] if self.is_open else found
 
     def subject(self, one: Hypothesis) -> str:

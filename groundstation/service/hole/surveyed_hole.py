@@ -391,17 +391,17 @@ class SurveyedHole:
         return self._misfit[2]
 
     def _errors_of_depths(self) -> DepthErrors:
-        """Errors of measured depths; where the whole hole is worked out anew, as far as they scatter at make-ups."""
-        if not self._is_adjusted:
-            return self._depth_errors
+        """Errors of measured depths, as far as they scatter at make-ups."""
         found = depths_at_make_ups(self._stops, self._shared, self._config, self._setup)
         std = learnt_reading_std(found, self._depth_errors, self._config.tube_length)
         return replace(self._depth_errors, reading_std=std)
 
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
-        depths, places_of, errors = {}, self._stops.depth_places.__getitem__, self._errors_of_depths()
-        stds = length_stds(self._setup)
-        told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()}
+        depths, places_of = {}, self._stops.depth_places.__getitem__
+        # how depths scatter is another thing at every stop, and is taken in where all stations are worked out anew
+        errors = self._errors_of_depths() if self._is_adjusted else self._depth_errors
+        stds = length_stds(self._setup) if self._setup.lengths else {}
+        told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()} if stds else {}
         for one in changed:
             places = [*map(places_of, one.stops.rows)]
             depths[one.md] = mean_depth(one.md, places, errors, self._config.tube_length, told)

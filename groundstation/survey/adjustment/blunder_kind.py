@@ -18,6 +18,7 @@ class BlunderKind(StrEnum):
     JOINT_SLIPPED = auto()
     JOINT_MISREAD = auto()
     ENCODER_SLIPPED = auto()
+    ENCODER_DRIFTS = auto()
     HOLE_MOVED = auto()
     DEPTH_WRONG_ONCE = auto()
     DEPTH_WRONG_FROM = auto()

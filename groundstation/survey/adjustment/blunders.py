@@ -109,11 +109,6 @@ class Examination:
         """Weighted squares of what is left over what they are to be: 1 in an honest hole."""
         return global_ratio(self.adjusted)
 
-    @property
-    def doubts_collar(self) -> bool:
-        """Whether what was told of the collar counts no more, for a blunder or the suspicion of one."""
-        return COLLAR in _taken_in([*self.blunders, *filter(None, [self.suspicion])])
-
 
 def global_ratio(found: Adjusted) -> float:
     """Weighted squares of what the looks leave over what they are to be."""

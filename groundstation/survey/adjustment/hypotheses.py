@@ -34,7 +34,7 @@ CONSTANT = (K.BIAS_WRONG, K.TILT_WRONG, K.MOUNT_MISREAD, K.JOINT_MISREAD)
 KNOWN_SIZE = (K.AXES_EXCHANGED, K.TUBES_EXCHANGED)  # of amplitude one, put right in the looks themselves
 BY_TILT = (K.TILT_SLIPPED, K.TILT_WRONG)
 BY_DEPTH = (K.DEPTH_WRONG_ONCE, K.DEPTH_WRONG_FROM)
-OF_CHAIN = (K.JOINT_SLIPPED, K.JOINT_MISREAD, K.ENCODER_SLIPPED)
+OF_CHAIN = (K.JOINT_SLIPPED, K.JOINT_MISREAD, K.ENCODER_SLIPPED, K.ENCODER_DRIFTS)
 BY_TURN = (K.MOUNT_TURNED, K.MOUNT_MISREAD, *OF_CHAIN)
 WIDTHS = {
     **dict.fromkeys(OF_FORCE, 3),
@@ -66,8 +66,8 @@ def effect_of(
 ) -> tuple[Places, Array]:
     """Looks (r,) that a hypothesis changes, and the change (r, 3, q) of their force for one unit of it.
 
-    Units are m/s^2 (a second, of a creep), rad, m, or one for what has a known size. Of a depth that is wrong by about
-    ``reach`` (m) it is the mean change over that length.
+    Units are m/s^2 (a second, of a creep), rad (a stop, of a drift), m, or one for what has a known size. Of a depth
+    that is wrong by about ``reach`` (m) it is the mean change over that length.
     """
     amplitude = effect_amplitudes(one, looks, run)
     rows = np.flatnonzero(amplitude)
@@ -147,6 +147,8 @@ def _turned_by(one: Hypothesis, looks: Looks, run: RunOfStops) -> Array:
     """Turn (n,) of the yaw of every look for one radian of a joint or of the encoder."""
     if one.kind is K.ENCODER_SLIPPED:
         return np.ones(len(looks))
+    if one.kind is K.ENCODER_DRIFTS:
+        return looks.stop.astype(np.float64)  # a belt slips by a part of what it turns, about the same at every stop
     return np.asarray(run.causes.turned_looks(looks)[run.causes.names.index((JOINT, one.subject[0]))])
 
 
@@ -173,6 +175,8 @@ def thinned_stops(stops: list[int]) -> list[int]:
 
 
 def _of_string(stops: list[int], onsets: set[int]) -> Iterator[Hypothesis]:
+    if len(stops) > FEWEST_TO_CREEP:
+        yield Hypothesis(K.ENCODER_DRIFTS, ())
     for stop in stops[1:]:
         if stop in onsets:
             yield Hypothesis(K.ENCODER_SLIPPED, (), stop)

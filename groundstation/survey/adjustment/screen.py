@@ -83,10 +83,11 @@ def _squares(pulled: Array, whole: Array, white: Array) -> tuple[Array, Places]:
 
 
 def _turn_test(found: Adjusted, run: RunOfStops, pulled: Array, white: Array) -> tuple[Array, Places]:
-    """Of every cause of turns from every stop on."""
+    """Of every cause of turns and of the encoder from every stop on, and of an encoder that drifts."""
     looks = found.looks
     since = looks.stop >= np.unique(looks.stop)[:, None]
-    masks = (run.causes.turned_looks(looks)[:, None] * since).reshape(-1, len(looks))
+    turned = np.concatenate([run.causes.turned_looks(looks), np.ones((1, len(looks)))])
+    masks = np.concatenate([(turned[:, None] * since).reshape(-1, len(looks)), looks.stop[None].astype(np.float64)])
     return _masked_test(found, pulled, white, masks, found.linear.jacobians[:, :, 7:8])
 
 

@@ -82,6 +82,8 @@ def dense_effect(one: Hypothesis, dense: DenseHole, drawn: DrawnString) -> Array
     elif one.kind in (K.JOINT_SLIPPED, K.JOINT_MISREAD):
         touched &= (looks.tube <= tube) & (looks.stop > tube)
         columns = rows[:, :, dense.gravity_at + 1 :].sum(axis=2, keepdims=True)
+    elif one.kind is K.ENCODER_DRIFTS:
+        columns = rows[:, :, dense.gravity_at + 1 :].sum(axis=2, keepdims=True) * looks.stop[:, None, None]
     elif one.kind is K.ENCODER_SLIPPED:
         columns = rows[:, :, dense.gravity_at + 1 :].sum(axis=2, keepdims=True)
     else:

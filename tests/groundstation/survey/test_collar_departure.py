@@ -37,7 +37,8 @@ def test_the_score_is_that_of_what_the_stations_say_without_it(off_deg: float) -
     off = bases @ (path.collar - found.now.tangents[0])
     cov = found.covs[0, :2, :2] + bases @ path.collar_cov @ bases.T
     assert departure.told == 2
-    assert departure.squares == pytest.approx(off @ np.linalg.solve(cov, off), rel=0.03, abs=0.03)
+    # the two have learnt how much the hole bends from legs that differ by the first
+    assert departure.squares == pytest.approx(off @ np.linalg.solve(cov, off), rel=0.1, abs=0.05)
 
 
 def test_a_collar_that_was_told_wrong_is_named_and_counts_no_more() -> None:
@@ -46,11 +47,11 @@ def test_a_collar_that_was_told_wrong_is_named_and_counts_no_more() -> None:
     off_deg = 12.0 * float(np.hypot(curved, np.sqrt(np.trace(drawn.path.collar_cov) / 2.0))) / DEG
     found = examined(replace(drawn, path=told_off(drawn, off_deg)))
     assert [one.best.hypothesis.kind for one in found.blunders] == [BlunderKind.COLLAR_WRONG]
-    assert found.doubts_collar
     assert "collar" in say_blunder(found.blunders[0], drawn.run, NAMES)
     size = np.linalg.norm(found.blunders[0].best.size) / DEG
     assert size == pytest.approx(off_deg, rel=0.3)
 
 
 def test_honest_collars_are_left_in_peace() -> None:
-    assert not any(examined(draw_string(seed)).doubts_collar for seed in range(20, 40))
+    found = [one.best.hypothesis.kind for seed in range(20, 40) for one in examined(draw_string(seed)).blunders]
+    assert BlunderKind.COLLAR_WRONG not in found

@@ -375,7 +375,7 @@ export interface UncertaintyAnswer {
 /** Something that is wrong with the hole or its string. */
 export interface BlunderRow {
   /** what explains the contradiction best */
-  kind: "bias_stepped" | "bias_creeps" | "bias_wrong" | "tilt_slipped" | "tilt_wrong" | "mount_turned" | "mount_misread" | "joint_slipped" | "joint_misread" | "encoder_slipped" | "hole_moved" | "depth_wrong_once" | "depth_wrong_from" | "axes_exchanged" | "tubes_exchanged" | "look_wrong" | "collar_wrong";
+  kind: "bias_stepped" | "bias_creeps" | "bias_wrong" | "tilt_slipped" | "tilt_wrong" | "mount_turned" | "mount_misread" | "joint_slipped" | "joint_misread" | "encoder_slipped" | "encoder_drifts" | "hole_moved" | "depth_wrong_once" | "depth_wrong_from" | "axes_exchanged" | "tubes_exchanged" | "look_wrong" | "collar_wrong";
   /** what it is of, such as a tube; empty of all */
   subject: string;
   /** depth of the bit at the stop from which on, or at which, it is wrong */
@@ -431,7 +431,7 @@ export interface ToePart {
 /** A mistake that may be made at the last stop, of its kind the one that does most at the toe when not found. */
 export interface LeastFound {
   /** what would be wrong */
-  kind: "bias_stepped" | "bias_creeps" | "bias_wrong" | "tilt_slipped" | "tilt_wrong" | "mount_turned" | "mount_misread" | "joint_slipped" | "joint_misread" | "encoder_slipped" | "hole_moved" | "depth_wrong_once" | "depth_wrong_from" | "axes_exchanged" | "tubes_exchanged" | "look_wrong" | "collar_wrong";
+  kind: "bias_stepped" | "bias_creeps" | "bias_wrong" | "tilt_slipped" | "tilt_wrong" | "mount_turned" | "mount_misread" | "joint_slipped" | "joint_misread" | "encoder_slipped" | "encoder_drifts" | "hole_moved" | "depth_wrong_once" | "depth_wrong_from" | "axes_exchanged" | "tubes_exchanged" | "look_wrong" | "collar_wrong";
   /** what it is of, such as a tube; empty of all */
   subject: string;
   /** size from which on it would be found; null if nothing can tell */
