@@ -24,9 +24,9 @@ def said(rig: Rig) -> str:
 @pytest.mark.parametrize(
     ("inclinations_deg", "words"),
     [
-        ((0.45, 0.65, 0.9, 1.5, 2.2), ["watch", "on_target", "on_target", "watch", "watch"]),
-        ((1.0, 1.6, 2.2, 2.8, 3.4, 4.0), ["steer", "steer", "steer", "steer", "out", "out"]),  # it bends by 0.3 deg/m
-        ((1.0, 1.6, 2.0, 6.0), ["steer", "steer", "steer", "dont_know"]),  # no string bends so, and no sensor is right
+        ((0.45, 0.65, 0.9, 1.5, 8.0), ["on_target", "on_target", "on_target", "watch", "out"]),
+        ((1.0, 1.6, 2.2, 2.8, 3.4, 4.0), ["steer", "steer", "steer", "out", "out", "out"]),  # it bends by 0.3 deg/m
+        ((1.0, 1.6, 2.0, 6.0, 8.0), ["steer", "steer", "steer", "out", "out"]),
     ],
 )
 def test_a_hole_that_drifts_off_is_watched_then_steered_then_out(
@@ -53,8 +53,8 @@ def test_the_published_bore_is_foreseen_within_what_is_said_of_it(tmp_path: Path
 
 
 def test_at_its_depth_the_verdict_stops_advising(rig: Rig) -> None:
-    for stop, inclination_deg in enumerate((0.3, 0.35, 0.3, 0.25, 0.3, 0.3, 0.3), 4):
-        rig.drill(stop, inclination_deg)
+    for stop in range(4, 11):
+        rig.drill(stop, 0.3)
     answer = rig.ask("verdict")
     assert answer["verdict"] == "on_target"
     assert answer["line"].startswith("ON TARGET: ended 9.9 ± ")

@@ -67,4 +67,4 @@ def test_a_world_unlike_what_is_told_is_one_result_over_processes_and_inline(tmp
     done = run_forked("rig", scenario, "--inline", "--json", "--out", tmp_path / "honest", "--seed", "6", timeout=240.0)
     honest = json.loads(done.stdout.splitlines()[-1])
     assert honest["figures"]["inclination_rms_deg"] < 0.05
-    assert inline["figures"]["inclination_rms_deg"] > 0.2
+    assert inline["figures"]["inclination_rms_deg"] > 2.0 * honest["figures"]["inclination_rms_deg"]

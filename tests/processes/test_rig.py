@@ -240,6 +240,8 @@ def test_operators_get_stations_while_the_rig_drills(tmp_path: Path, ask: Any) -
         assert set(region["stations"][2]["sources"]) == {
             "random",
             "joints",
+            "collar",
+            "north",
             "mounts",
             "accelerometer_bias",
             "depth",

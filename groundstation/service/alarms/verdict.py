@@ -96,7 +96,7 @@ def judge_hole(known: Known) -> HoleVerdict:
     doubts = list(known.doubts)
     if known.projection is None:
         doubts.insert(0, (VerdictDoubt.NO_SURVEY, "no station has been surveyed yet"))
-    elif verdict.word is not Word.OUT and (spread := SURELY * known.projection.surveyed_std) >= known.projection.limit:
+    elif not _is_out_surely(verdict) and (spread := SURELY * known.projection.surveyed_std) >= known.projection.limit:
         limit = f"{100.0 * known.projection.limit:.0f} cm"
         why = f"the surveys leave the end open by ±{100.0 * spread:.0f} cm, the limit is {limit}"
         doubts.append((VerdictDoubt.UNCERTAIN, why))
@@ -105,6 +105,14 @@ def judge_hole(known: Known) -> HoleVerdict:
     return replace(
         verdict, word=Word.DONT_KNOW, why=tuple(text for _, text in doubts), doubts=tuple(doubt for doubt, _ in doubts)
     )
+
+
+def _is_out_surely(verdict: HoleVerdict) -> bool:
+    """Whether the hole has left its tolerance, or ends outside however far its end is open by the surveys."""
+    if verdict.word is not Word.OUT or verdict.end is None:
+        return verdict.word is Word.OUT
+    end = verdict.end
+    return math.hypot(*end.ends.offset) - SURELY * end.surveyed_std > end.limit
 
 
 def judge_surveys(known: Known) -> HoleVerdict:

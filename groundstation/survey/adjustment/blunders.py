@@ -140,8 +140,10 @@ def examine_hole(
             break
         if blunder.best.log_chance <= math.log(FALSE_ALARM):
             found.append(blunder)
-        else:
+        elif len(np.unique(looks.tube)) > 1:
             suspicion = blunder
+        else:
+            break  # of one tube alone only what is known of path and collar speaks against it
         now = adjust_with(looks, string, path, run, _taken_in([*found, *filter(None, [suspicion])]), now.found.now)
     blunders = tuple(_resized(one, now, _taken_in(found)) for one in found)
     return Examination(now.found, blunders, suspicion)

@@ -26,6 +26,7 @@ Places = npt.NDArray[np.intp]
 REPEATED: Final = 0.01  # m, standard deviation of the height at make-ups before they tell it
 KNOWN_AS: Final = 4.0  # steps that what is known before counts for
 HABIT: Final = 4  # other steps by which one is judged
+TO_JUDGE: Final = 2  # numbers of tubes with which it was surveyed
 LEAST_STEP: Final = 0.05  # m that is told
 SURELY: Final = 5.0  # standard deviations, of sums of many errors
 UNLIKE: Final = 8.0  # of the other steps: their own scale is known from a few alone
@@ -90,8 +91,11 @@ def learnt_reading_std(found: MakeUpDepths, errors: DepthErrors, tube_length: fl
 
 
 def misfit_of_depths(found: MakeUpDepths, errors: DepthErrors, tube_length: float) -> str:
-    """Why the depths do not fit the tubes, in words, or nothing."""
-    if not len(found.tubes):
+    """Why the depths do not fit the tubes, in words, or nothing.
+
+    A string that was run in before, and to which no tube was added since, may hang from anything.
+    """
+    if len(found.tubes) < TO_JUDGE:
         return ""
     if found.is_at_make_ups(tube_length) and (unlike := _unlike_step(found) or _drift(found, errors)):
         return unlike
