@@ -349,7 +349,7 @@ def test_an_added_disturbance_acts_in_a_plain_rig_a_rough_rig_and_a_campaign_or_
         from sim.campaign.chunk import Campaign
         from sim.errors import ScenarioError
         from sim.string.hops import draw_hops
-        from sim.string.reading_suppliers import supply_readings
+        from sim.string.reading_suppliers import draw_readings
         from sim.world.scenario import scenario_of
         from sim.world.world import World
 
@@ -372,10 +372,11 @@ def test_an_added_disturbance_acts_in_a_plain_rig_a_rough_rig_and_a_campaign_or_
             string, world = Campaign(scenario).string, World(scenario, 3)
             drawn, hops = string.new_readings(world), draw_hops(world)
             field = None if string.rough is None else string.rough.run(world).field
-            rows = [
-                supply_readings(None, drawn, field, string.schedule, hops, cycle)[0, 0, 2] for cycle in range(150)
-            ]
-            return np.array(rows)
+            rows = np.zeros(150)
+            for cycle in range(150):
+                draw_readings(drawn, field, string.schedule, hops, cycle)
+                rows[cycle] = drawn.readings[0, 0, 2]
+            return rows
 
         found = {}
         for name, tables in (("plain", PLAIN), ("rough", ROUGH)):

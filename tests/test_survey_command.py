@@ -106,15 +106,23 @@ def test_a_tool_of_the_owsg_set_and_its_sources_at_every_station(tmp_path: Path)
 
 def test_two_holes_that_come_near_end_with_status_three(tmp_path: Path) -> None:
     one, other = tmp_path / "one.csv", tmp_path / "other.csv"
-    one.write_text("MD (m),Inc,Azi\n0,0,0\n15,2,90\n30,2,90\n")
-    other.write_text("MD (m),Inc,Azi\n0,0,0\n15,0,0\n30,0,0\n")
+    head = "MD (m),Inc,Azi\n0,0,0\n"
+    one.write_text(head + "".join(f"{md},{min(2 * md / 15, 2)},90\n" for md in range(5, 31, 5)))
+    other.write_text(head + "".join(f"{md},0,0\n" for md in range(5, 31, 5)))
     words = ("clearance", one, other, "--offset-head", 0, 1.4, 0, "--radius-m", 0.1, "--offset-radius-m", 0.1)
-    far = answer(*words, "--sigma-ahead-m", 0.02, "--margin-m", 0.0)
+    bare = ("--sigma-ahead-m", 0.02, "--margin-m", 0.0)
+    far = answer(*words, *bare)
     near = answer(*words, status=3)
     assert (far["clear"], near["clear"]) == (True, False)
     assert near["least"]["md_m"] == 30.0
     assert near["least"]["distance_m"] == pytest.approx(0.616, abs=0.01)
     assert "TOO NEAR: least factor" in run(*words).stdout
+    # the same holes with stations 15 m apart: the arcs keep as far, but what the paths do between them is not known
+    one.write_text(head + "15,2,90\n30,2,90\n")
+    other.write_text(head + "15,0,0\n30,0,0\n")
+    sparse, arcs = answer(*words, *bare, status=3), answer(*words, *bare, "--curvature-sigma-deg-per-m", 0)
+    assert (sparse["clear"], arcs["clear"]) == (False, True)
+    assert sparse["least"]["distance_m"] == pytest.approx(far["least"]["distance_m"], abs=1e-3)
 
 
 @pytest.mark.parametrize("course", [30, 100])

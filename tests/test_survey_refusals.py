@@ -9,6 +9,11 @@ import pytest
 from forked_commands import run
 
 OK = "MD (m),Inc,Azi\n0,0,0\n500,30,40\n600,31,41\n"
+CLOSE = (  # the same hole, a station every 20 m
+    "MD (m),Inc,Azi\n0,0,0\n"
+    + "".join(f"{md},{0.06 * md},40\n" for md in range(20, 501, 20))
+    + "".join(f"{md},{0.01 * (md - 500) + 30},{0.01 * (md - 500) + 40}\n" for md in range(520, 601, 20))
+)
 DEEP = "MD (m),Inc,Azi\n500,30,40\n600,31,41\n"
 TIE = "md_m = 500\ninclination_deg = 33\nazimuth_deg = 40\nnorth_m = 90\neast_m = 75\ntvd_m = 470\n"
 GAP = '[[leg]]\nfrom_m = 0\nto_m = 400\ninstrument = "mwd-rev5.1"\n[[leg]]\nfrom_m = 550\ninstrument = "relay"\n'
@@ -110,12 +115,22 @@ def test_holes_that_have_no_clearance_are_refused_in_one_line(
 
 
 @pytest.mark.slow
-def test_parallel_holes_keep_clear_all_along(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("record", "words", "clear"),
+    [
+        (CLOSE, (), True),
+        (OK, (), False),  # over 500 m without a station a path may leave its arc by more than the 30 m between them
+        (OK, ("--curvature-sigma-deg-per-m", 0), True),  # unless it does what the arc does
+    ],
+)
+def test_parallel_holes_keep_clear_all_along_where_stations_tell_their_paths(
+    tmp_path: Path, record: str, words: tuple[object, ...], clear: bool
+) -> None:
     one = tmp_path / "one.csv"
-    one.write_text(OK)
-    done = run("clearance", one, one, "--offset-head", 0, 30, 0, "--same-instrument", "--json")
+    one.write_text(record)
+    done = run("clearance", one, one, "--offset-head", 0, 30, 0, "--same-instrument", *words, "--json")
     found = json.loads(done.stdout)
-    assert (done.returncode, done.stderr, found["clear"]) == (0, "", True)
+    assert (done.returncode, done.stderr, found["clear"]) == (0 if clear else 3, "", clear)
     assert found["nearest"]["distance_m"] == pytest.approx(min(row["distance_m"] for row in found["stations"]), abs=0.5)
 
 

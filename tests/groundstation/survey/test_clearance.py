@@ -239,6 +239,25 @@ def test_a_path_between_stations_wanders_as_drawn_ones_do(share: float) -> None:
     assert np.mean(drawn**2) == pytest.approx(claimed, rel=0.12)
 
 
+def test_a_surveyed_hole_wanders_by_what_lies_between_its_stations_alone() -> None:
+    """A curvature of the variance s^2 is forgotten over l: legs L, shorter, gather s^2 L^5 / (360 l) each.
+
+    That is what the rule of trapezoids errs by for directions whose curvature is driven by a noise 2 s^2 / l. Stations
+    half as far apart tell 2^4 as much a metre, and a leg much longer than l errs by s^2 l L^3 / 6.
+    """
+    wander = LegWander(0.3 * DEG, 20.0)
+    ends = []
+    for leg in (2.0, 4.0):
+        md = np.arange(0.0, 600.1, leg)
+        at_stations = HoleWander(md, wander).variances(np.arange(len(md) - 1), np.ones(len(md) - 1))
+        settled = at_stations[round(200.0 / leg) :]  # ten l below the collar, the first leg is forgotten
+        np.testing.assert_allclose(np.diff(settled), wander.std**2 * leg**5 / (360.0 * wander.length), rtol=0.01)
+        ends.append(float(settled[-1] - settled[0]))
+    assert ends[1] / ends[0] == pytest.approx(16.0, rel=0.03)
+    unsurveyed = HoleWander(np.array([0.0, 2000.0]), wander).variances(np.array([0]), np.ones(1))
+    assert unsurveyed[0] == pytest.approx(wander.std**2 * wander.length * 2000.0**3 / 6.0, rel=0.05)
+
+
 def test_the_wander_of_both_paths_is_in_the_sigma_of_their_distance() -> None:
     wander, rule = LegWander(0.3 * DEG, 20.0), Rule(margin=0.0)
     one, other = straight(0.0), straight(5.0)
