@@ -19,8 +19,8 @@ from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import SAME_STOP
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
-from groundstation.survey.adjustment.blunders import Blunder
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
+from groundstation.survey.adjustment.blunders import Blunder
 from groundstation.survey.fusion.fusion import DEPARTED, Evidence, departures_from, judge_departure
 
 
