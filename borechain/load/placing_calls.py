@@ -23,7 +23,7 @@ from groundstation.config import checked_config
 from groundstation.survey.fusion.fusion import Weighting
 
 TUBES, STOPS = 10, 10
-CALLS_AT_MOST = {Weighting.BAYES: 330, Weighting.ADJUSTED: 2400}  # an adjustment works the whole hole out
+CALLS_AT_MOST = {Weighting.BAYES: 300, Weighting.ADJUSTED: 2400}  # an adjustment works the whole hole out
 OURS = str(Path(groundstation.__file__).parent)
 CLOCKS = str(Path(groundstation.__file__).parent / "recording")
 

@@ -50,8 +50,9 @@ class AlarmList:
 
     def judge_deviation(self, deviation: Deviation, at: float) -> bool:
         """Raise and clear by a new deviation as drilled at rig time ``at`` (s); whether anything changed."""
-        cleared = [level for level in LEVELS if deviation.ratio < level - CLEARED_BELOW]
-        return self._judge(DEVIATION, deviation, deviation.half_width, cleared, at)
+        ratio = deviation.ratio
+        cleared = [level for level in LEVELS if ratio < level - CLEARED_BELOW]
+        return self._judge(DEVIATION, deviation, deviation, cleared, at)
 
     def judge_projection(self, end: ProjectedEnd, at: float) -> bool:
         """Raise and clear by a new projection at rig time ``at`` (s); whether anything changed."""
@@ -61,19 +62,23 @@ class AlarmList:
             for level in standing
             if end.ends.ratio < level and end.chance_within(level * end.limit) >= CLEARED_FROM
         ]
-        half_width = end.half_width if end.ends.level > max(standing, default=0.0) else math.nan
-        return self._judge(PROJECTION, end.ends, half_width, cleared, at)
+        return self._judge(PROJECTION, end.ends, end, cleared, at)
 
-    def _judge(self, kind: str, deviation: Deviation, half_width: float, cleared: Sequence[float], at: float) -> bool:
-        """Raise the levels that are reached and do not stand, and clear some of those that do."""
-        changed, standing = False, dict[float, int]()
+    def _judge(
+        self, kind: str, deviation: Deviation, spread: Deviation | ProjectedEnd, cleared: Sequence[float], at: float
+    ) -> bool:
+        """Raise the levels that are reached and do not stand, and clear some of those that do.
+
+        The half width of ``spread`` is worked out where one is raised.
+        """
+        changed, standing, ratio = False, dict[float, int](), deviation.ratio
         for place, alarm in enumerate(self.alarms):
             if alarm.kind == kind and alarm.cleared_at is None:
                 standing[alarm.level] = place
         for level in LEVELS:
             known = standing.get(level)
-            if known is None and deviation.ratio >= level:
-                self.alarms.append(_alarm_of(kind, level, deviation, half_width, at))
+            if known is None and ratio >= level:
+                self.alarms.append(_alarm_of(kind, level, deviation, spread.half_width, at))
                 changed = True
             elif known is not None and level in cleared:
                 self.alarms[known] = replace(self.alarms[known], cleared_at=at)

@@ -82,7 +82,7 @@ class Resolver:
     ) -> ResolvedStops:
         stops = ResolvedStops(len(measurements))
         rows, by_force = stops.rows, np.empty((len(measurements), AXES, AXES))
-        by_yaw = np.empty((len(measurements), AXES))
+        by_yaw, across = np.empty((len(measurements), AXES)), np.empty((len(measurements), 2, AXES))
         for name, values in zip(COLUMNS, zip(*map(sent_of, measurements), strict=True), strict=True):
             rows[name] = values
         rows["replaces"], rows["departed"], rows["departure"] = NO_NUMBER, 0.0, np.nan
@@ -91,21 +91,22 @@ class Resolver:
             rows["trust"][row] = trust_of(m.flags)
             alike[len(m.imus)].append(row)
         for own in alike.values():
-            by_force[own], by_yaw[own] = self._resolve_alike(stops, own, [measurements[row] for row in own])
+            alike_here = [measurements[row] for row in own]
+            by_force[own], by_yaw[own], across[own] = self._resolve_alike(stops, own, alike_here)
         for row, (m, tubes) in enumerate(zip(measurements, above, strict=True)):
             stops.places.append(self._shared.places_of(m.tube, tubes))
             rows["width"][row], rows["chain"][row] = self._shared.count, self._shared.chain_of(m.tube, tubes)
-        rows["causes"] = planes_across(rows["tangent"]) @ causes_of_all(
+        rows["causes"] = across @ causes_of_all(
             by_yaw, by_force, stops.places, rows["systematic_var"], self._mount_var, self._bias_std
         )
         return stops
 
     def _resolve_alike(
         self, stops: ResolvedStops, own: Sequence[int], measurements: Sequence[SurveyMeasurement]
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Array, Array, Array]:
         """Directions and quality of measurements with the same number of IMUs, into some rows of a table.
 
-        Returns how their unit vectors change by force (n, 3, 3) and by yaw (n, 3).
+        Returns how their unit vectors change by force (n, 3, 3) and by yaw (n, 3), and two (n, 2, 3) across them.
         """
         forces = np.array([[*map(force_of, m.imus)] for m in measurements])
         covs = np.array([[*map(force_cov_of, m.imus)] for m in measurements])
@@ -119,7 +120,7 @@ class Resolver:
         rows["quality"][own], rows["force_var"][own] = quality, force_vars(covs)
         for row, each in zip(own, forces, strict=True):
             stops.forces[row] = each.tobytes()
-        return found.by_force, found.by_yaw
+        return found.by_force, found.by_yaw, axes
 
 
 def force_vars(covs: Array) -> Array:

@@ -140,7 +140,7 @@ class SurveyStation:
     @property
     def first(self) -> int:
         """Place of the first stop that counts."""
-        return self.first_before(len(self.stops.rows))
+        return max(self.drops) if self.drops else 0
 
     def first_before(self, place: int) -> int:
         """Place of the first stop that counted when the one at ``place`` came."""

@@ -59,8 +59,8 @@ def stack_of(readings: Sequence[Direction]) -> Stack:
 def _stacked(found: Sequence[SphereDirection], width: int = 0) -> Stack:
     """The same, with as many columns as the widest has, or ``width``."""
     columns = _columns_of(found, max(width, *map(WIDTH, found)) if len(found) > 1 else max(width, found[0].width))
-    tangents, covs, yaw_vars = (np.array([*map(part, found)]) for part in (TANGENT, OWN, YAW_VARS))
-    return Stack(tangents, covs, columns, yaw_vars)
+    tangents, covs = np.array([*map(TANGENT, found)]), np.array([*map(OWN, found)])
+    return Stack(tangents, covs, columns, np.array([*map(YAW_VARS, found)]))
 
 
 def _columns_of(directions: Sequence[SphereDirection], width: int) -> Array:
@@ -121,7 +121,7 @@ class GrowingBayes:
     @staticmethod
     def fuse_each(growing: Sequence[GrowingBayes], ranges: Sequence[tuple[int, int]], readings: Stack) -> None:
         """Fuse the readings of several ranges, which stand one after the other; each as by itself bit for bit."""
-        begin = np.cumsum([0, *(end - first for first, end in ranges)])
+        begin = np.append(0, np.cumsum(np.diff(ranges)))
         packed = packed_each(readings.shared)
         found = fuse_on_sphere(readings.tangents, readings.covs, packed, readings.yaw_vars, begin)
         for one, (first, end), direction in zip(growing, ranges, found, strict=True):

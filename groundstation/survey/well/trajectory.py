@@ -123,32 +123,32 @@ class Trajectory:
     @property
     def md(self) -> Array:
         """Depths (n,) of the points, m."""
-        return np.asarray(self._rows["md"][: len(self)])
+        return np.asarray(self._rows["md"][: len(self._directions)])
 
     @property
     def tangent_covs(self) -> Array:
         """Covariances (n, 3, 3) of the directions, of each the part that no other shares."""
-        return np.asarray(self._rows["own"][: len(self)])
+        return np.asarray(self._rows["own"][: len(self._directions)])
 
     @property
     def positions(self) -> Array:
         """Positions (n, 3) of the points, m."""
-        return np.asarray(self._rows["position"][: len(self)])
+        return np.asarray(self._rows["position"][: len(self._directions)])
 
     @property
     def tangents(self) -> Array:
         """Tangents (n, 3) at the points."""
-        return np.asarray(self._rows["tangent"][: len(self)])
+        return np.asarray(self._rows["tangent"][: len(self._directions)])
 
     @property
     def covs(self) -> Array:
         """Covariances (n, 3, 3) of the positions, m^2."""
-        return np.asarray(self._rows["cov"][: len(self)])
+        return np.asarray(self._rows["cov"][: len(self._directions)])
 
     @property
     def path_covs(self) -> Array:
         """Covariances (n, 3, 3), m^2, that the path between the stations makes of ``covs``."""
-        return np.asarray(self._rows["path"][: len(self)])
+        return np.asarray(self._rows["path"][: len(self._directions)])
 
     @property
     def depth_covs(self) -> Array:
@@ -225,7 +225,7 @@ class Trajectory:
                 raise SurveyError(f"trajectory: expected a depth beyond {collar:g} m, got {md:g} m")
         for md, direction in stations:
             place = int(np.searchsorted(self.md, md))
-            if place == len(self) or self._rows["md"][place] != md:
+            if place == len(self._directions) or self._rows["md"][place] != md:
                 self._insert(place, md, direction)
             elif self._directions[place] is direction:
                 continue
@@ -310,7 +310,7 @@ class Trajectory:
 
     def _insert(self, place: int, md: float, direction: Direction) -> None:
         """Insert a row for a station; what follows from its direction is not in it yet."""
-        known, count = self._rows, len(self)
+        known, count = self._rows, len(self._directions)
         if count == len(known):
             self._rows = np.zeros(count + 1 + count // GROWTH, ROW)
             self._rows[:count] = known
@@ -347,7 +347,7 @@ class Trajectory:
             begin -= begin % BLOCK
             del self._kept[begin + 1 :], self._marks[begin // BLOCK + 1 :]
             self._sums = self._marks[-1]
-        end = len(self)
+        end = len(self._directions)
         rows = self._rows[begin:end]
         legs = self._legs(rows)
         rows["position"] = np.add.accumulate(np.concatenate([rows["position"][:1], legs]))
