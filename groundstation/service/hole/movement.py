@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import NamedTuple
@@ -149,7 +149,7 @@ class Movement:
             one.station.departure(one.place)
 
 
-def moved_stations(examined: ExaminedHole, below: list[SurveyStation]) -> list[Moved]:
+def moved_stations(examined: ExaminedHole, below: Sequence[SurveyStation]) -> list[Moved]:
     """Where an adjusted hole moved; the stations are told from which stop on they are where they are now.
 
     Parameters
@@ -165,7 +165,7 @@ def moved_stations(examined: ExaminedHole, below: list[SurveyStation]) -> list[M
     return found
 
 
-def _moved_by(blunder: Blunder, examined: ExaminedHole, below: list[SurveyStation]) -> Iterator[Moved]:
+def _moved_by(blunder: Blunder, examined: ExaminedHole, below: Sequence[SurveyStation]) -> Iterator[Moved]:
     best = blunder.best
     (first, last), since = best.hypothesis.subject, float(examined.run.time[best.hypothesis.stop])
     evidence = Evidence(math.sqrt(float(best.size @ np.linalg.solve(best.cov, best.size))), (), agree=True)

@@ -10,38 +10,34 @@ import itertools
 import math
 from bisect import bisect_left, insort
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.config import GroundConfig
+from groundstation.service.hole.adjusted_stations import AdjustedStations, adjusted_stations, learnt_wander
 from groundstation.service.hole.blunder_search import RunApart
 from groundstation.service.hole.deviation_alarms import AlarmList
 from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import History, Moment
-from groundstation.service.hole.hole_adjustment import HoleAdjustment, directions_of
-from groundstation.service.hole.movement import Moved, Movement, moved_stations
+from groundstation.service.hole.hole_adjustment import HoleAdjustment
+from groundstation.service.hole.hole_depths import HoleDepths
+from groundstation.service.hole.movement import Moved, Movement
+from groundstation.service.hole.position_sources import depth_variance_at_toe, variances_by_source
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
-from groundstation.service.hole.told_depths import depths_at_make_ups
 from groundstation.service.setup.setup_book import SetupBook
-from groundstation.service.setup.setup_priors import collar_direction, depth_errors, length_stds, north_std
-from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.service.setup.setup_priors import collar_direction, north_std
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
-from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
-from groundstation.survey.fusion.tangents import tangents_of
+from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.fusion.transport import Carried, carry_directions
 from groundstation.survey.fusion.trust_level import Trust
 from groundstation.survey.path.curvature_tendency import CurvatureTendency, learn_curvature
-from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.wall.column_deviation import Deviations, axis_deviations
 from groundstation.survey.wall.projected_end import ProjectedEnd, project_to_target
-from groundstation.survey.well.depth_errors import DepthErrors, mean_depth
-from groundstation.survey.well.make_up_depths import learnt_reading_std, misfit_of_depths
-from groundstation.survey.well.trajectory import TURNED_BACK, Trajectory
+from groundstation.survey.well.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
 
@@ -78,24 +74,20 @@ class SurveyedHole:
         self.version += 1
         self._is_behind = True
         self._collar = collar_direction(self._config, self._setup)
-        self._depth_errors = depth_errors(self._config, self._setup)
-        self._misfit: tuple[int, float, str] = (0, 0.0, "")  # of depths, by version and since when
         self._stops = ResolvedStops()
+        self._depths = HoleDepths(self._config, self._setup, self._shared, self._stops)
         self._station_of: list[SurveyStation] = []  # of each of its rows
         self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
         self._stations: list[SurveyStation] = []
         self._movement = Movement(self._stops, self._station_of)
-        self._moved: list[Moved] = []  # of the adjusted hole
-        self._surveyed_back: list[float] = []  # m, in it
         self._adjustment = HoleAdjustment(self._config, self._shared)
         if self._run_apart is not None:
             self._adjustment.search_apart(self._run_apart)
         self._examined: tuple[int, ExaminedHole | None] = (0, None)  # of the version that it is of
         self._is_unsolved = False
-        self._adjusted: dict[float, Direction] = {}  # by the depth (m) of a station, where the hole is adjusted
+        self._stands = AdjustedStations(self._collar)
         self._alarms = AlarmList()
         self._history = History(kept)
-        self._adjusted_collar: Direction = self._collar
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
         self._trajectory = self._drawn_from(self._collar)
         self._deviations = self._deviate()
@@ -194,7 +186,7 @@ class SurveyedHole:
     def moved(self) -> list[Moved]:
         """Where the hole moved."""
         self.settle()
-        return self._moved if self._is_adjusted else self._movement.moved
+        return self._stands.moved if self._is_adjusted else self._movement.moved
 
     @property
     def alarms(self) -> AlarmList:
@@ -225,7 +217,7 @@ class SurveyedHole:
         The adjustment of the hole leaves such a survey out, and what is drawn points on.
         """
         self.settle()
-        return self._surveyed_back if self._is_adjusted else self._trajectory.turned_back
+        return self._stands.turned_back if self._is_adjusted else self._trajectory.turned_back
 
     def direction_of(self, station: SurveyStation) -> Direction:
         """Direction of the hole at a station, the transport of the string in it."""
@@ -271,7 +263,7 @@ class SurveyedHole:
         """Direction of a station without transport; that of the collar is the collar's where the hole is adjusted."""
         if not self._is_adjusted:
             return station.fused(self._config.weighting)
-        return self._adjusted.get(station.md, self._adjusted_collar)
+        return self._stands.directions.get(station.md, self._stands.collar)
 
     @property
     def has_transport(self) -> bool:
@@ -290,30 +282,13 @@ class SurveyedHole:
 
         They are worked out when they are asked for: a start goes through hundreds of stops and shows none of them.
         """
-        drawn = self.trajectory
-        found = self._variances_of_directions(drawn)
-        for name, covs in (("depth", drawn.depth_covs), ("path", drawn.path_covs)):
-            found[name] = found.get(name, 0.0) + np.diagonal(covs, axis1=1, axis2=2)
-        rest = np.diagonal(drawn.covs, axis1=1, axis2=2) - sum(found.values())
-        return {"random": np.maximum(rest, 0.0)} | found
+        drawn, examined = self.trajectory, self.examined if self._is_adjusted else None
+        return variances_by_source(drawn, self._shared, examined, north_std(self._setup))
 
     @property
     def toe_by_depth(self) -> Array:
         """Variance (3,), m^2, of the last position by what is not known of depths."""
-        drawn = self.trajectory
-        *_, columns = drawn.columns()
-        shared = self._shared.variances(columns)[-1, KIND_NAMES.index("depth")]
-        return np.asarray(shared + np.diagonal(drawn.depth_covs[-1]))
-
-    def _variances_of_directions(self, drawn: Trajectory) -> dict[str, Array]:
-        """Variances (n, 3), m^2, along a trajectory by what directions have in common."""
-        shared = np.concatenate([self._shared.variances(columns) for columns in drawn.columns()])
-        found = dict(zip(KIND_NAMES, np.moveaxis(shared, 1, 0), strict=True))
-        if not self._is_adjusted or self.examined is None:
-            return found
-        turned = np.square(drawn.positions[:, 1::-1]) * north_std(self._setup) ** 2
-        north = np.concatenate([turned, np.zeros((len(turned), 1))], axis=1)
-        return {"depth": found["depth"], "north": north} | self.examined.position_variances
+        return depth_variance_at_toe(self.trajectory, self._shared)
 
     def place_of(self, station: SurveyStation) -> int:
         """Place of a station in the trajectory; that of the collar for one at its depth."""
@@ -339,44 +314,19 @@ class SurveyedHole:
 
     def _adjust(self) -> list[SurveyStation]:
         """Adjust the hole; all of its stations have changed, and so has the direction from which it is drawn."""
-        self._touched, examined, below = {}, self.examined, self._below
+        self._touched, below = {}, self._below
         for station in self._stations:
             station.forget_view()
-        if examined is None:
-            self._stand_alone(below)
-            return below
-        at_collar, *found = directions_of(examined.adjusted, self._shared, north_std(self._setup))
-        self._adjusted = dict(zip([one.md for one in below], found, strict=True))
-        self._adjusted_collar = at_collar
-        self._trajectory = self._drawn_from(at_collar)
-        self._bend_as(examined.adjusted)
-        self._moved = moved_stations(examined, below)
-        self._surveyed_back = self._points_back(below)
+        self._stands = adjusted_stations(self.examined, below, self._collar, self._shared, north_std(self._setup))
+        self._trajectory = self._drawn_from(self._stands.collar)
+        if self._stands.found is not None:
+            self._trajectory.bend_as(*learnt_wander(self._stands.found, self._config.curvature_length))
         return below
-
-    def _stand_alone(self, below: Sequence[SurveyStation]) -> None:
-        """Take every station for what its own surveys say, where they have no solution in common."""
-        self._adjusted = {one.md: one.fused(Weighting.BAYES) for one in below}
-        self._adjusted_collar, self._trajectory = self._collar, self._drawn_from(self._collar)
-        self._moved, self._surveyed_back = [], self._points_back(below)
-
-    def _points_back(self, below: Sequence[SurveyStation]) -> list[float]:
-        """Depths (m) of stations that by themselves point back against the one above."""
-        tangents = tangents_of([self._collar, *(one.fused(Weighting.BAYES) for one in below)])
-        back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
-        return [below[place].md for place in back.tolist()]
-
-    def _bend_as(self, found: Adjusted) -> None:
-        """Have what lies between stations follow the curvature that the adjustment has learnt."""
-        wander = LegWander(math.sqrt(found.now.curvature_var), self._config.curvature_length)
-        driven = found.now.leg_vars / found.now.curvature_var
-        driven[:-1] = np.maximum(driven[:-1], driven[1:])  # what bends sharply may have begun above the station
-        self._trajectory.bend_as(wander, driven)
 
     def _fuse(self, since: float) -> list[SurveyStation]:
         """Fuse the stations of which something may have changed since a time (s), together those with one more stop."""
         by_depth = self._touched | self._movement.judge_since(since)
-        changed, self._touched = [by_depth[md] for md in sorted(by_depth)], {}
+        changed, self._touched = [*map(by_depth.__getitem__, sorted(by_depth))], {}
         weighting = self._config.weighting
         if weighting is Weighting.BAYES and (grown := [station for station in changed if station.lacks_newest]):
             SurveyStation.fuse_together(grown, self._stops)
@@ -384,27 +334,10 @@ class SurveyedHole:
 
     def depth_misfit(self, since: float) -> str:
         """Why the depths of surveys after a rig time (s) do not fit the tubes, in words, or nothing."""
-        if self._misfit[:2] != (self.version, since):
-            found = depths_at_make_ups(self._stops, self._shared, self._config, self._setup, since)
-            what = misfit_of_depths(found, self._depth_errors, self._config.tube_length)
-            self._misfit = self.version, since, what
-        return self._misfit[2]
-
-    def _errors_of_depths(self) -> DepthErrors:
-        """Errors of measured depths, as far as they scatter at make-ups."""
-        found = depths_at_make_ups(self._stops, self._shared, self._config, self._setup)
-        std = learnt_reading_std(found, self._depth_errors, self._config.tube_length)
-        return replace(self._depth_errors, reading_std=std)
+        return self._depths.misfit(self.version, since)
 
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
-        depths, places_of = {}, self._stops.depth_places.__getitem__
-        # how depths scatter is another thing at every stop, and is taken in where all stations are worked out anew
-        errors = self._errors_of_depths() if self._is_adjusted else self._depth_errors
-        stds = length_stds(self._setup) if self._setup.lengths else {}
-        told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()} if stds else {}
-        for one in changed:
-            places = [*map(places_of, one.stops.rows)]
-            depths[one.md] = mean_depth(one.md, places, errors, self._config.tube_length, told)
+        depths = self._depths.of_stations(changed, learns=self._is_adjusted)
         self._trajectory.put(self._directions(changed), depths)
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)
@@ -434,14 +367,14 @@ class SurveyedHole:
         """
         if not self.has_transport:
             if self._is_adjusted:
-                return [*self._adjusted.items()]
+                return [*self._stands.directions.items()]
             return [(one.md, one.fused(self._config.weighting)) for one in changed if one.md > 0.0]
         measured = [(one.md, self._found(one)) for one in self._below]
         if not measured:
             return []
         mds, directions = zip(*measured, strict=True)
         places = self._shared.transport_places(len(measured) + 1)
-        self._carried = dict(zip(mds, carry_directions(self._adjusted_collar, directions, places), strict=True))
+        self._carried = dict(zip(mds, carry_directions(self._stands.collar, directions, places), strict=True))
         return [(md, carried.direction) for md, carried in self._carried.items()]
 
     def _deviate(self) -> Deviations:

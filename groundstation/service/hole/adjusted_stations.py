@@ -1,0 +1,78 @@
+"""Where the stations of an adjusted hole point, which of them moved, and which point back. No I/O."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.service.hole.examined_hole import ExaminedHole
+from groundstation.service.hole.hole_adjustment import directions_of
+from groundstation.service.hole.movement import Moved, moved_stations
+from groundstation.service.hole.station import SurveyStation
+from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.fusion.fusion import Weighting
+from groundstation.survey.fusion.resolve import Direction
+from groundstation.survey.fusion.shared import SharedErrors
+from groundstation.survey.fusion.tangents import tangents_of
+from groundstation.survey.path.leg_wander import LegWander
+from groundstation.survey.well.trajectory import TURNED_BACK
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class AdjustedStations:
+    """Stations below the collar, as an adjustment has them.
+
+    Parameters
+    ----------
+    collar : direction there
+    directions : by depth (m), from the top down
+    moved : where the hole moved
+    turned_back : depths (m) of stations whose surveys point back against those of the one above
+    found : the adjustment; None where the surveys have no solution in common
+    """
+
+    collar: Direction
+    directions: dict[float, Direction] = field(default_factory=dict)
+    moved: list[Moved] = field(default_factory=list)
+    turned_back: list[float] = field(default_factory=list)
+    found: Adjusted | None = None
+
+
+def adjusted_stations(
+    examined: ExaminedHole | None, below: Sequence[SurveyStation], told: Direction, shared: SharedErrors, north: float
+) -> AdjustedStations:
+    """Stations of an adjusted hole; without a solution each stands for what its own surveys say.
+
+    Parameters
+    ----------
+    below : stations below the collar, from the top down
+    told : direction at the collar
+    north : rad, standard deviation of the encoder's zero
+    """
+    alone = [one.fused(Weighting.BAYES) for one in below]
+    tangents = tangents_of([told, *alone])
+    back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
+    turned_back, mds = [below[place].md for place in back.tolist()], [one.md for one in below]
+    if examined is None:
+        return AdjustedStations(told, dict(zip(mds, alone, strict=True)), [], turned_back)
+    collar, *found = directions_of(examined.adjusted, shared, north)
+    moved = moved_stations(examined, below)
+    return AdjustedStations(collar, dict(zip(mds, found, strict=True)), moved, turned_back, examined.adjusted)
+
+
+def learnt_wander(found: Adjusted, curvature_length: float) -> tuple[LegWander, Array]:
+    """How the path wanders between stations by the curvature that an adjustment has learnt, and each leg's share (s,).
+
+    Parameters
+    ----------
+    curvature_length : m, over which a curvature is forgotten
+    """
+    driven = found.now.leg_vars / found.now.curvature_var
+    driven[:-1] = np.maximum(driven[:-1], driven[1:])  # what bends sharply may have begun above the station
+    return LegWander(math.sqrt(found.now.curvature_var), curvature_length), driven

@@ -1,0 +1,66 @@
+"""The depths of a hole's stations: how well each is known, and whether they fit the tubes. No I/O."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from groundstation.config import GroundConfig
+from groundstation.service.hole.resolved_stops import ResolvedStops
+from groundstation.service.hole.station import SurveyStation
+from groundstation.service.hole.told_depths import depths_at_make_ups
+from groundstation.service.setup.setup_book import SetupBook
+from groundstation.service.setup.setup_priors import depth_errors, length_stds
+from groundstation.survey.fusion.shared import SharedErrors
+from groundstation.survey.well.depth_errors import DepthErrors, StationDepth, mean_depth
+from groundstation.survey.well.make_up_depths import learnt_reading_std, misfit_of_depths
+
+
+class HoleDepths:
+    """Depths by what was told of the rig and by what the make-ups say of them.
+
+    Parameters
+    ----------
+    config, setup : of the ground station
+    shared : the errors that readings share
+    stops : every stop
+    """
+
+    def __init__(self, config: GroundConfig, setup: SetupBook, shared: SharedErrors, stops: ResolvedStops) -> None:
+        self._config, self._setup, self._shared, self._stops = config, setup, shared, stops
+        self._told = depth_errors(config, setup)
+        self._misfit: tuple[int, float, str] = (0, 0.0, "")  # by version and since when
+
+    def misfit(self, version: int, since: float) -> str:
+        """Why the depths of surveys after a rig time (s) do not fit the tubes, in words, or nothing.
+
+        Parameters
+        ----------
+        version : of the hole; it is worked out once for each
+        """
+        if self._misfit[:2] != (version, since):
+            found = depths_at_make_ups(self._stops, self._shared, self._config, self._setup, since)
+            self._misfit = version, since, misfit_of_depths(found, self._told, self._config.tube_length)
+        return self._misfit[2]
+
+    def of_stations(self, stations: Sequence[SurveyStation], *, learns: bool) -> dict[float, StationDepth]:
+        """Errors of the depths of stations, by these (m).
+
+        Parameters
+        ----------
+        learns : how depths scatter at make-ups is taken in; that is another thing at every stop, so where all stations
+            are worked out anew
+        """
+        errors = self._learnt() if learns else self._told
+        stds = length_stds(self._setup) if self._setup.lengths else {}
+        told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()} if stds else {}
+        found, places_of = {}, self._stops.depth_places.__getitem__
+        for one in stations:
+            places = [*map(places_of, one.stops.rows)]
+            found[one.md] = mean_depth(one.md, places, errors, self._config.tube_length, told)
+        return found
+
+    def _learnt(self) -> DepthErrors:
+        """Errors of measured depths, as far as they scatter at make-ups."""
+        found = depths_at_make_ups(self._stops, self._shared, self._config, self._setup)
+        return replace(self._told, reading_std=learnt_reading_std(found, self._told, self._config.tube_length))

@@ -1,0 +1,50 @@
+"""Of what the variances along a trajectory are made, source by source. No I/O."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.service.hole.examined_hole import ExaminedHole
+from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
+from groundstation.survey.well.trajectory import Trajectory
+
+Array = npt.NDArray[np.float64]
+
+
+def variances_by_source(
+    drawn: Trajectory, shared: SharedErrors, examined: ExaminedHole | None, north_std: float
+) -> dict[str, Array]:
+    """Variances (n, 3) of the positions of a trajectory (m^2) by their sources, which add up to the whole.
+
+    Parameters
+    ----------
+    shared : the errors that it shares
+    examined : the adjustment from which it is drawn; None where stations are fused one by one
+    north_std : rad, of the encoder's zero
+    """
+    found = _of_directions(drawn, shared, examined, north_std)
+    for name, covs in (("depth", drawn.depth_covs), ("path", drawn.path_covs)):
+        found[name] = found.get(name, 0.0) + np.diagonal(covs, axis1=1, axis2=2)
+    rest = np.diagonal(drawn.covs, axis1=1, axis2=2) - sum(found.values())
+    return {"random": np.maximum(rest, 0.0)} | found
+
+
+def _of_directions(
+    drawn: Trajectory, shared: SharedErrors, examined: ExaminedHole | None, north_std: float
+) -> dict[str, Array]:
+    """Variances (n, 3), m^2, by what directions have in common."""
+    common = np.concatenate([shared.variances(columns) for columns in drawn.columns()])
+    found = dict(zip(KIND_NAMES, np.moveaxis(common, 1, 0), strict=True))
+    if examined is None:
+        return found
+    turned = np.square(drawn.positions[:, 1::-1]) * north_std**2
+    north = np.concatenate([turned, np.zeros((len(turned), 1))], axis=1)
+    return {"depth": found["depth"], "north": north} | examined.position_variances
+
+
+def depth_variance_at_toe(drawn: Trajectory, shared: SharedErrors) -> Array:
+    """Variance (3,), m^2, of the last position by what is not known of depths."""
+    *_, columns = drawn.columns()
+    common = shared.variances(columns)[-1, KIND_NAMES.index("depth")]
+    return np.asarray(common + np.diagonal(drawn.depth_covs[-1]))
