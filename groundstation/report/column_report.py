@@ -18,7 +18,7 @@ from groundstation.report.style import svg_of
 from groundstation.survey.tools.instruments import SurveyTool
 from groundstation.survey.wall.column_deviation import ColumnDesign, Deviation, Tolerance, point_deviation
 from groundstation.survey.well.reference_frames import SiteGrid
-from groundstation.survey.well.trajectory import TrajectoryPoint
+from groundstation.survey.well.trajectory_rows import TrajectoryPoint
 
 Array = npt.NDArray[np.float64]
 CONFIDENCE = 0.95

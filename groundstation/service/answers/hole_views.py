@@ -31,7 +31,7 @@ from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.survey.fusion.resolve import direction_angles
 from groundstation.survey.fusion.sphere_direction import stds_of_directions
 from groundstation.survey.well.ellipsoid import Ellipse, coverage_radius, ellipsoid_axes, plan_ellipses
-from groundstation.survey.well.trajectory import TrajectoryPoint
+from groundstation.survey.well.trajectory_rows import TrajectoryPoint
 
 Array = npt.NDArray[np.float64]
 Values = dict[str, Any]  # of some fields of a row

@@ -15,7 +15,7 @@ from groundstation.survey.wall.wall_columns import state_words
 from groundstation.survey.wall.wall_file import Wall
 from groundstation.survey.wall.wall_joints import ExtraColumn, Joints, worst_depths, worst_joint
 from groundstation.survey.wall.wall_verdict import Finding, Judgement, joint_name
-from groundstation.survey.well.trajectory import TrajectoryPoint
+from groundstation.survey.well.trajectory_rows import TrajectoryPoint
 
 
 def wall_result(found: Wall, judgement: Judgement) -> dict[str, Any]:

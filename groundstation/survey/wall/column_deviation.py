@@ -23,7 +23,7 @@ from groundstation.errors import SurveyError
 from groundstation.survey.bearings import planes_across
 from groundstation.survey.fusion.resolve import Direction, direction_angles
 from groundstation.survey.fusion.sphere_direction import stds_of_directions
-from groundstation.survey.well.trajectory import TrajectoryPoint
+from groundstation.survey.well.trajectory_rows import TrajectoryPoint
 from groundstation.survey.well.well_plan import WellPlan
 
 Array = npt.NDArray[np.float64]

@@ -20,7 +20,7 @@ from groundstation.survey.path.curvature_tendency import CurvatureTendency
 from groundstation.survey.path.normal_mixture import CONFIDENCE, NOWHERE, NormalMixture
 from groundstation.survey.path.path_ahead import PathAhead
 from groundstation.survey.wall.column_deviation import ColumnDesign, Deviation, point_deviation
-from groundstation.survey.well.trajectory import TrajectoryPoint
+from groundstation.survey.well.trajectory_rows import TrajectoryPoint
 
 Array = npt.NDArray[np.float64]
 STEEPEST = 0.05  # cosine between hole and axis, below which the hole does not come to the target's depth

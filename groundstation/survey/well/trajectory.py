@@ -17,7 +17,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from operator import attrgetter, itemgetter
 from typing import Final
 
@@ -26,19 +25,21 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.fusion.packed import Packed
-from groundstation.survey.fusion.resolve import Direction, direction_angles
+from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import add_shared_errors
 from groundstation.survey.fusion.sphere_direction import tangent_errors
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
 from groundstation.survey.path.leg_wander import STEADY, LegWander
-from groundstation.survey.well.arcs import arc_displacements, bend_angles, on_arc
+from groundstation.survey.well.arcs import on_arc
 from groundstation.survey.well.depth_errors import EXACT, StationDepth
-from groundstation.survey.well.methods import OPPOSITE, Method, leg_displacement
+from groundstation.survey.well.methods import Method
+from groundstation.survey.well.trajectory_legs import check_bends, leg_displacements
 from groundstation.survey.well.trajectory_rows import (
     FEWEST,
     GROWTH,
     ROW,
     Followed,
+    TrajectoryPoint,
     TrajectorySums,
     across_of,
     runs_of,
@@ -54,17 +55,6 @@ NOTHING: Final = np.zeros(0)
 FROM_ZERO: Final = np.zeros(1, np.intp)
 ALL_EXACT: Final[Mapping[float, StationDepth]] = {}
 TURNED_BACK = math.cos(math.radians(120.0))  # of the bend of one leg, beyond which it is no hole any more
-
-
-@dataclass(frozen=True, slots=True)
-class TrajectoryPoint:
-    """One station of a trajectory."""
-
-    md: float  # m
-    tangent: Array  # (3,)
-    position: Array  # (3,) m, north east down
-    cov: Array  # (3, 3) m^2, random and shared
-    shared: Array  # (3, s) m, change for one standard deviation of every shared error; (3, 0) where it is not kept
 
 
 class Trajectory:
@@ -193,7 +183,7 @@ class Trajectory:
         for before, md in itertools.pairwise(mds):
             if not 0.0 < md - before < math.inf:
                 raise SurveyError(f"trajectory: expected a depth beyond {before:g} m, got {md:g} m")
-        self._check_bends(mds, [self._directions[-1], *(direction for _, direction in stations)])
+        check_bends(self.method, mds, tangents_of([self._directions[-1], *(direction for _, direction in stations)]))
         known = len(self)
         for place, (md, direction) in enumerate(stations, known):
             self._insert(place, md, direction)
@@ -349,7 +339,7 @@ class Trajectory:
             self._sums = self._marks[-1]
         end = len(self._directions)
         rows = self._rows[begin:end]
-        legs = self._legs(rows)
+        legs = leg_displacements(self.method, rows["md"], rows["tangent"])
         rows["position"] = np.add.accumulate(np.concatenate([rows["position"][:1], legs]))
         more = self._go_along(begin, rows, legs)
         followed = self._follow(self._sums, begin, end - 1, with_columns=self._keeps_columns)
@@ -424,27 +414,3 @@ class Trajectory:
             runs_of(shared, widths) if with_columns else [],
             covs,
         )
-
-    def _legs(self, rows: npt.NDArray[np.void]) -> Array:
-        """Displacements (n, 3) from station to station."""
-        upper, lower, lengths = rows["tangent"][:-1], rows["tangent"][1:], np.diff(rows["md"])
-        if self.method is Method.MINIMUM_CURVATURE:
-            return arc_displacements(lengths, upper, lower)
-        if self.method is Method.BALANCED_TANGENTIAL:
-            return np.asarray((0.5 * lengths)[:, None] * (upper + lower))
-        angles = [direction_angles(tangent[:2], float(tangent[2])) for tangent in rows["tangent"]]
-        return np.array(
-            [
-                leg_displacement(math, self.method, length, *before, *after)
-                for length, (before, after) in zip(lengths.tolist(), itertools.pairwise(angles), strict=True)
-            ]
-        )
-
-    def _check_bends(self, mds: Sequence[float], directions: Sequence[Direction]) -> None:
-        """Refuse legs of which minimum curvature has no arc."""
-        if self.method is not Method.MINIMUM_CURVATURE:
-            return
-        tangents = tangents_of(directions)
-        for leg in np.flatnonzero(bend_angles(tangents[:-1], tangents[1:]) > math.pi - OPPOSITE).tolist():
-            above, below = mds[leg], mds[leg + 1]
-            raise SurveyError(f"trajectory: the hole turns back on itself between {above:g} and {below:g} m")

@@ -1,4 +1,4 @@
-"""Rows of a trajectory: what is kept of each station, and the sums with which its errors go on from there.
+"""Points and rows of a trajectory: what is told and kept of each station, and the sums with which its errors go on.
 
 Frame: north, east, down; m.
 """
@@ -33,6 +33,17 @@ ROW: Final = np.dtype(
 )
 FEWEST = 8  # rows of a table
 GROWTH = 8  # share of its rows by which a table grows
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectoryPoint:
+    """One station of a trajectory."""
+
+    md: float  # m
+    tangent: Array  # (3,)
+    position: Array  # (3,) m, north east down
+    cov: Array  # (3, 3) m^2, random and shared
+    shared: Array  # (3, s) m, change for one standard deviation of every shared error; (3, 0) where it is not kept
 
 
 @dataclass(frozen=True, slots=True)

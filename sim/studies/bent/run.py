@@ -29,7 +29,8 @@ from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.fusion.transport import carry_directions
 from groundstation.survey.well.ellipsoid import coverage_radius
 from groundstation.survey.well.methods import Method
-from groundstation.survey.well.trajectory import Trajectory, TrajectoryPoint
+from groundstation.survey.well.trajectory import Trajectory
+from groundstation.survey.well.trajectory_rows import TrajectoryPoint
 from node.kernels.arithmetic.angles import wrap_angle
 from sim.string.direct_string import DirectString
 from sim.string.result import StringSurvey

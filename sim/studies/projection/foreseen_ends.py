@@ -15,7 +15,8 @@ from groundstation.survey.path.path_between import tendency_between
 from groundstation.survey.wall.column_deviation import ColumnDesign, parse_tolerance
 from groundstation.survey.wall.projected_end import project_to_target
 from groundstation.survey.well.methods import Method
-from groundstation.survey.well.trajectory import Trajectory, TrajectoryPoint
+from groundstation.survey.well.trajectory import Trajectory
+from groundstation.survey.well.trajectory_rows import TrajectoryPoint
 from sim.studies.projection.drilled_holes import LENGTH, DrilledHole
 from sim.world.random_streams import RandomStream, random_stream
 

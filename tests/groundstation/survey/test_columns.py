@@ -18,7 +18,7 @@ from groundstation.survey.wall.column_deviation import (
     parse_tolerance,
     point_deviation,
 )
-from groundstation.survey.well.trajectory import TrajectoryPoint
+from groundstation.survey.well.trajectory_rows import TrajectoryPoint
 
 DEG = math.pi / 180.0
 COV = np.array([[4e-4, 1e-4, 2e-5], [1e-4, 1e-4, -3e-5], [2e-5, -3e-5, 2.5e-5]])

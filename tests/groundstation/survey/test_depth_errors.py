@@ -15,7 +15,8 @@ from groundstation.survey.fusion.resolve import Direction, known_direction
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.well.depth_errors import EXACT, DepthErrors, mean_depth
-from groundstation.survey.well.trajectory import Trajectory, TrajectoryPoint
+from groundstation.survey.well.trajectory import Trajectory
+from groundstation.survey.well.trajectory_rows import TrajectoryPoint
 
 DEG = math.pi / 180.0
 STEP = 0.02  # m

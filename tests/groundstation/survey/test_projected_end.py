@@ -13,7 +13,7 @@ from groundstation.survey.path.curvature_tendency import CurvatureTendency, lear
 from groundstation.survey.path.path_ahead import root_of
 from groundstation.survey.wall.column_deviation import ColumnDesign
 from groundstation.survey.wall.projected_end import CONE_POINTS, ProjectedEnd, project_to_target
-from groundstation.survey.well.trajectory import TrajectoryPoint
+from groundstation.survey.well.trajectory_rows import TrajectoryPoint
 
 DEG = math.pi / 180.0
 # a ground that all but goes straight, without layers: what is foreseen is the straight line

@@ -18,7 +18,7 @@ from groundstation.survey.wall.column_deviation import (
     axis_deviations,
 )
 from groundstation.survey.wall.projected_end import project_to_target
-from groundstation.survey.well.trajectory import TrajectoryPoint
+from groundstation.survey.well.trajectory_rows import TrajectoryPoint
 from groundstation.survey.well.well_plan import PlanLeg, WellPlan
 
 DEG = math.pi / 180.0
