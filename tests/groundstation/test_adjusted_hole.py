@@ -209,3 +209,15 @@ def test_many_looks_of_few_or_more_stops_are_adjusted_the_same_in_any_order(tmp_
     assert len(placed) > 1500
     one, other = (numbers_of(knowing(tmp_path, each, tubes)) for each in (placed, placed[::-1]))
     assert one == other
+
+
+def test_north_is_in_every_position_as_it_turns_the_hole_about_the_vertical(tmp_path: Path) -> None:
+    """A hole to the north is moved to the east by the angle times how far north it is, and neither north nor down."""
+    measurements = passes(5, lambda _stop, _station: 5.0)
+    model = knowing(tmp_path, measurements, 5, north_std_deg=1.0)
+    by_north, drawn = model.hole.variances["north"], model.hole.trajectory
+    np.testing.assert_allclose(np.sqrt(by_north[:, 1]), math.radians(1.0) * drawn.positions[:, 0], rtol=1e-9)
+    assert float(np.max(by_north[:, [0, 2]])) < 1e-20
+    exact = knowing(tmp_path / "exact", measurements, 5)
+    more = drawn.covs[:, 1, 1] - exact.hole.trajectory.covs[:, 1, 1]
+    np.testing.assert_allclose(more[1:], by_north[1:, 1], rtol=1e-3)

@@ -181,6 +181,21 @@ def test_surveys_too_uncertain_to_tell_are_not_on_target() -> None:
     assert judge_hole(nearly).word is Word.WATCH
 
 
+@pytest.mark.parametrize(
+    ("used", "surveyed", "word"),
+    [
+        (0.2, 3.6, Word.DONT_KNOW),  # 9 cm off, and open by metres: it is in by less than one in a hundred, and not out
+        (5.0, 1.2, Word.DONT_KNOW),
+        (50.0, 1.2, Word.OUT),  # out however far it is open
+    ],
+)
+def test_an_end_that_is_wide_open_is_out_only_where_all_of_it_is(used: float, surveyed: float, word: Word) -> None:
+    end = ending(used, surveyed, surveyed, is_reached=True)
+    found = judge_hole(Known(LENGTH, CURVATURE, STOP, LENGTH, off(0.1), end))
+    assert (found.word, found.by_surveys) == (word, Word.OUT)
+    assert found.doubts == ((VerdictDoubt.UNCERTAIN,) if word is Word.DONT_KNOW else ())
+
+
 @given(
     worst=st.floats(0.0, 3.0),
     end=st.floats(0.0, 3.0),

@@ -16,7 +16,7 @@ from scipy.stats import f as f_distribution
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunder_words import SENTENCES, say_blunder
-from groundstation.survey.adjustment.blunders import examine_hole
+from groundstation.survey.adjustment.blunders import examine_hole, is_plausible
 from groundstation.survey.adjustment.hypotheses import (
     OF_FORCE,
     Hypothesis,
@@ -271,3 +271,12 @@ def test_stops_are_thinned_to_the_latest_and_some_before(count: int) -> None:
     assert kept == sorted(set(kept))
     assert kept[-16:] == list(range(count))[-16:]
     assert len(kept) <= 24
+
+
+@pytest.mark.parametrize("kind", [BlunderKind.DEPTH_WRONG_ONCE, BlunderKind.DEPTH_WRONG_FROM])
+@pytest.mark.parametrize(("size", "is_one"), [(-2.9, True), (2.0, True), (3.1, False), (-15.0, False)])
+def test_a_depth_is_off_by_a_tube_and_not_by_half_of_the_hole(kind: BlunderKind, size: float, is_one: bool) -> None:
+    """Stations are 2 m apart; one tube too many is 2 m."""
+    drawn = draw_string(1)
+    assert is_plausible(Hypothesis(kind, (), 3), np.array([size]), drawn.run) is is_one
+    assert is_plausible(Hypothesis(BlunderKind.JOINT_MISREAD, (1,)), np.array([size]), drawn.run)
