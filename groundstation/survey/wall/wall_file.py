@@ -33,6 +33,7 @@ from groundstation.survey.wall.wall_tables import STRAIGHT, Defaults, Remedy, re
 from groundstation.survey.well.depth_reference import DEPTHS_FROM
 from groundstation.survey.well.methods import Method
 from groundstation.survey.well.reference_frames import SiteGrid
+from telemetry.toml_tables import parse_toml_tables
 
 if TYPE_CHECKING:
     from groundstation.plan_settings import PlanSettings
@@ -165,7 +166,7 @@ def read_wall_file(path: Path) -> WallFile:
         One line: file, key, what was expected and what came.
     """
     try:
-        data = tomllib.loads(path.read_text("utf-8"))
+        data = parse_toml_tables(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise SurveyError(f"{path}: {reason}; expected a wall file") from error
