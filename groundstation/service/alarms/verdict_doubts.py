@@ -22,6 +22,7 @@ ALARMS = {
     "depth_contradicts": VerdictDoubt.DEPTH,
     "depth_silent": VerdictDoubt.STALE,
     "clock": VerdictDoubt.CLOCK,
+    "lease": VerdictDoubt.STALE,
 }
 
 
