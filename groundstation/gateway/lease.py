@@ -70,7 +70,7 @@ class RigLease:
         self._bus, self._rig, self._reach, self._clock = bus, rig, reach, clock
         self._pattern = keys.LEASE.format(rig=rig, holder="*")
         self._closed = threading.Event()
-        self._follower = ""  # token of who has the rig now
+        self._follower = ""  # token of the ground station that has the rig now
         self._is_deaf = False
         self._contested_since: float | None = None  # s, since another one's older token is there
         self._take_back: Callable[[], None] = lambda: None
@@ -134,7 +134,7 @@ class RigLease:
                 self.confirm()
 
     def _look_into(self, silent: float) -> None:
-        """The router is away, or does not know this session (any more): a fresh one finds out who has the rig."""
+        """The router is away, or no longer knows this session: a fresh one finds out which ground station has the rig."""
         if silent <= VALID:
             return
         with suppress(MediumError), self._reach() as fresh:
@@ -145,7 +145,7 @@ class RigLease:
             self._is_deaf = not others and silent > DEAF_AFTER
 
     def _take_anew(self, tokens: list[str]) -> None:
-        """After a lapse whoever took the rig meanwhile keeps it; the old token says nothing any more."""
+        """After a lapse a ground station that took the rig meanwhile keeps it; the old token says nothing any more."""
         others = [token for token in tokens if token != self._own]
         self._take_back()
         if others:
