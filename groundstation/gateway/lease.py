@@ -134,7 +134,7 @@ class RigLease:
                 self.confirm()
 
     def _look_into(self, silent: float) -> None:
-        """The router is away, or no longer knows this session: a fresh one finds out which ground station has the rig."""
+        """The router is away, or no longer knows this session: a fresh one finds out whose the rig is."""
         if silent <= VALID:
             return
         with suppress(MediumError), self._reach() as fresh:

@@ -20,7 +20,7 @@ LOOK_AGAIN = 0.5  # s, own clock, while the lease is in doubt
 class LeasedProcess(Process):
     """Hands events to the ground station as long as its lease stands; answers go on all the time.
 
-    What is not taken in is not acknowledged, so that the string keeps it for whoever has the rig.
+    What is not taken in is not acknowledged, so that the string keeps it for the ground station that has the rig.
 
     Parameters
     ----------
