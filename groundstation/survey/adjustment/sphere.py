@@ -9,6 +9,7 @@ from groundstation.survey.adjustment.kernels.carried_bases import carry_bases
 
 Array = npt.NDArray[np.float64]
 TINY = 1e-12
+SMALL_TURN, LARGE_TURN = 0.05, 1.0  # rad, of an azimuth in one step, between which it is a turn about the vertical
 
 
 def carried_bases(tangents: Array) -> Array:
@@ -41,3 +42,21 @@ def step_directions(tangents: Array, bases: Array, steps: Array) -> Array:
     toward = np.einsum("ka,kai->ki", steps, bases) * np.sinc(angle / np.pi)
     moved = np.cos(angle) * tangents + toward
     return np.asarray(moved / np.linalg.norm(moved, axis=1, keepdims=True))
+
+
+def step_about_vertical(tangents: Array, bases: Array, steps: Array) -> Array:
+    """Directions (s, 3) after a step (s, 2), rad, of which a turn of the azimuth leaves the inclination as it is.
+
+    Where yaws are poor a step is a turn by many degrees, and a great circle would leave the inclination, of which the
+    looks are a thousand times as sure. Small turns, and those that are as long as the lean, are along great circles.
+    """
+    x, y, z = tangents.T
+    lean = np.hypot(x, y)
+    north, east, down = np.einsum("ka,kai->ik", steps, bases)
+    far = np.maximum(lean, TINY)
+    turn = (east * x - north * y) / far**2
+    inclination, azimuth = np.arctan2(lean, z) - down / far, np.arctan2(y, x) + turn
+    level = np.sin(inclination)
+    turned = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.cos(inclination)], axis=1)
+    is_turn = (np.abs(turn) > SMALL_TURN) & (np.abs(turn) < LARGE_TURN)
+    return np.where(is_turn[:, None], turned, step_directions(tangents, bases, steps))
