@@ -150,7 +150,7 @@ def _first_directions(tangents: Array, totals: Array, begin: Places) -> Array:
 
 
 def _steady_shares(now: Array, along: Array, begin: Places) -> Array:
-    """What of the squared leans (k,) of directions is not the noise of their readings, whose inclinations err by ``along``.
+    """What of the squared leans (k,) of directions is not noise; ``along`` (n,) rad^2 is that of the inclinations read.
 
     A yaw turns the true lean. That which was found is longer by the noise, its square by two variances in the mean.
     """
