@@ -182,7 +182,7 @@ def test_yaws_that_are_hardly_known_leave_sigmas_honest_and_inclinations_as_shar
         squares.append(squares_of(found, truth))
         read = np.arctan2(np.hypot(looks.force[:, 0], looks.force[:, 1]), -looks.force[:, 2])
         alone.append(read - true_inclination[looks.station])
-    assert 0.75 < np.mean(squares) < 1.3
+    assert 0.65 < np.mean(squares) < 1.4  # of 40 holes, whose stations share their azimuth
     well, poorly = (float(np.sqrt(np.mean(np.square(errors)))) for errors in off.values())
     assert poorly < 1.05 * well or not 1.0 < inclination_deg < 179.0
     assert poorly < 0.6 * np.sqrt(np.mean(np.concatenate(alone) ** 2))
