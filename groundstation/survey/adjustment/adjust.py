@@ -183,7 +183,7 @@ def poor_yaws(looks: Looks, count: int) -> Truths:
     """Which of the stations (count,) have looks, and of no look there a yaw that is known well."""
     best = np.full(count, np.inf)
     np.minimum.at(best, looks.station, looks.yaw_var)
-    return np.isfinite(best) & (best > POOR_YAW**2)
+    return np.asarray(np.isfinite(best) & (best > POOR_YAW**2))
 
 
 def _stepped(now: StartingPoint, bases: Array, solution: LinearSolution, turns: Truths) -> StartingPoint:

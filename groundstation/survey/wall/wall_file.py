@@ -340,7 +340,7 @@ def _detours(path: Path, names: list[str], remedies: list[Remedy], pairs: npt.ND
 
 
 def _check_apart(path: Path, columns: Columns) -> None:
-    """Refuse two columns whose designs are one: the second closes nothing."""
+    """Refuse two columns of the design that are one: the second closes nothing. A remedial one may stand in for it."""
     shown: dict[bytes, str] = {}
     for name, planned in zip(columns.names, columns.planned, strict=True):
         other = shown.setdefault(np.round(planned / SAME_PLACE).tobytes(), name)
@@ -356,7 +356,7 @@ def _check_design(
     ``helped`` : joints that have a way by remedial columns, whose own designs need not reach
     """
     columns = built.columns
-    _check_apart(file.path, columns)
+    _check_apart(file.path, columns.subset(np.unique(pairs)))
     alone = pairs[[j for j in range(len(pairs)) if j not in helped]]
     designs = [plan.design for plan in plans]
     try:
