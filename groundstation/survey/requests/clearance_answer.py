@@ -13,6 +13,7 @@ from groundstation.errors import SurveyError
 from groundstation.survey.files.field_files import read_any
 from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.requests.clearance_request import ClearanceRequest
+from groundstation.survey.requests.finite_figures import check_figures
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.well.analysis import record_variables
 from groundstation.survey.well.clearance import Clearance, ClearanceHole, Rule, Separations, clearance_between
@@ -48,6 +49,7 @@ def answer_clearance(request: ClearanceRequest) -> dict[str, Any]:
     SurveyError, ToolError
         When a record or an instrument cannot be used.
     """
+    check_figures(request)
     serial = "one" if request.same_instrument else ""
     mine = _Described(
         str(request.reference), read_any(request.reference).record, request.instrument, np.zeros(3), request.radius_m

@@ -18,6 +18,7 @@ from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, 
 from groundstation.survey.well.clearance import ClearanceHole, HolePair, Rule, clearance_between
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
 from groundstation.survey.well.hole_wander import HoleWander
+from groundstation.survey.well.leg_errors import leg_errors
 from groundstation.survey.well.methods import Method, station_positions
 
 DATA = Path(__file__).parents[2] / "data" / "survey"
@@ -58,7 +59,7 @@ def test_separation_factors_are_those_of_the_standard_set(name: str) -> None:
     factors = found.stations.independent_factor
     assert len(expected) == len(factors) == (69 if name == "10" else 100)
     assert float(factors.min()) == pytest.approx(float(expected.min()), abs=5e-4)
-    # beside it the printed ones of the sidetrack count some of its errors from the surface
+    # beside it those of the sidetrack: see the test below
     np.testing.assert_allclose(factors, expected, rtol=2e-2 if name == "10" else 3e-3, atol=1e-3)
     least = float(found.least.independent_factor[0])
     if name not in BETWEEN:
@@ -68,6 +69,32 @@ def test_separation_factors_are_those_of_the_standard_set(name: str) -> None:
     assert least == pytest.approx(factor, abs=1e-4)
     assert least < float(factors.min()) - 5e-3
     assert (float(found.least.md[0]), float(found.least.offset_md[0])) == pytest.approx((md, offset_md), abs=0.1)
+
+
+def test_the_printed_sidetrack_has_its_kick_off_station_misaligned_in_one_of_its_two_holes() -> None:
+    """What our factors of well 10 are off by: 1.8 % without it, and 0.6 % with it, as the other wells are by 0.3 %.
+
+    The station at 900 m is the last that both holes have, and what it reads wrong moves both alike. The set counts its
+    misalignment, a tenth of a degree to north and east, over the half leg of 15 m below it, in one of them.
+    """
+    reference, _ = published("reference", KICK_OFF)
+    offset, expected = published("10")
+    pair = HolePair(reference, offset, SITE, Rule())
+    found = pair.separations(np.arange(69.0))
+    leg, part, distance = pair.theirs.nearest(reference.positions)
+    unit = (reference.positions - pair.theirs.places(leg, part)) / np.maximum(distance, 1e-9)[:, None]
+    errors = leg_errors(offset.survey, offset.legs, SITE)
+    room = distance - reference.radius - offset.radius - 0.3
+    stated = (room / (3.5 * found.independent_factor)) ** 2  # half a metre of the rule in it
+    variance = stated.copy()
+    for name, axis in (("XYM3", 0), ("XYM4", 1)):
+        ours = np.sum(errors.effect((name, PropagationMode.SYSTEMATIC), leg, part) * unit, axis=1)
+        variance += (ours + 0.1 * DEG * 15.0 * unit[:, axis]) ** 2 - ours**2
+    with_it = found.independent_factor * np.sqrt(stated / variance)
+    departures = [np.abs(one[1:] / expected[1:] - 1.0) for one in (found.independent_factor, with_it)]
+    assert 0.015 < float(departures[0].max()) < 0.02
+    assert float(departures[1].max()) < 6e-3
+    assert float(np.sqrt(np.mean(departures[1] ** 2))) < 0.3 * float(np.sqrt(np.mean(departures[0] ** 2)))
 
 
 @pytest.mark.parametrize("course", [30.0, 100.0])
@@ -232,9 +259,10 @@ def drawn_departures(md: np.ndarray, std: float, length: float, share: float, dr
 
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.3, 0.6, 1.0])
-def test_a_path_between_stations_wanders_as_drawn_ones_do(share: float) -> None:
-    md, wander = np.array([0.0, 10.0, 16.0, 36.0]), LegWander(0.3 * DEG, 20.0)
-    claimed = HoleWander(md, wander).variances(np.array([2]), np.array([share]))[0]
+@pytest.mark.parametrize("stations", [(0.0, 10.0, 16.0, 36.0), (0.0, 30.0), (0.0, 30.0, 60.0, 90.0)])
+def test_a_path_between_stations_wanders_as_drawn_ones_do(share: float, stations: tuple[float, ...]) -> None:
+    md, wander = np.array(stations), LegWander(0.3 * DEG, 20.0)
+    claimed = HoleWander(md, wander).variances(np.array([len(md) - 2]), np.array([share]))[0]
     drawn = drawn_departures(md, wander.std, wander.length, share, 4000)
     assert np.mean(drawn**2) == pytest.approx(claimed, rel=0.12)
 
