@@ -13,6 +13,12 @@ from groundstation.service.hole.examined_hole import UNSOLVED
 from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.service.setup.readiness import told_briefly
 from groundstation.service.setup.setup_book import SetupBook
+from groundstation.service.setup.setup_checks import (
+    contradicted_kinds,
+    say_contradiction,
+    say_unchecked,
+    unchecked_kinds,
+)
 from groundstation.service.setup.setup_items import missing_names, setup_items
 from groundstation.service.string.known_string import KnownString
 
@@ -48,9 +54,13 @@ def known_of(
 
 
 def _doubts_of_setup(config: GroundConfig, setup: SetupBook, string: KnownString) -> Iterator[tuple[VerdictDoubt, str]]:
-    """Without north, or the angle of a joint, no azimuth is known."""
+    """Without north, or the angle of a joint, no azimuth is known; what was told once may be a slip."""
     if missing := missing_names(setup_items(config, setup, string)):
         yield VerdictDoubt.SETUP, f"not told: {told_briefly(missing)}"
+    for kind in contradicted_kinds(setup):
+        yield VerdictDoubt.CONTRADICTION, say_contradiction(setup, kind)
+    if unchecked := unchecked_kinds(setup):
+        yield VerdictDoubt.UNCHECKED, say_unchecked(unchecked)
 
 
 def _doubts_of_surveys(
