@@ -44,6 +44,7 @@ def known_of(
         bit=string.bit,
         worst=worst,
         projection=hole.projection if worst is not None else None,
+        unfound=_unfound_by_look(hole),
         doubts=(
             *_doubts_of_setup(config, setup, string),
             *_doubts_of_time(string, alarms, config.stale_after),
@@ -51,6 +52,13 @@ def known_of(
             *_contradictions(hole),
         ),
     )
+
+
+def _unfound_by_look(hole: SurveyedHole) -> float:
+    """By how much (m) the toe may be off if the tube errs that read the last station alone."""
+    examined = hole.examined if hole.is_adjusted else None
+    alone = None if examined is None else examined.last_look
+    return 0.0 if alone is None else alone.toe
 
 
 def _doubts_of_setup(config: GroundConfig, setup: SetupBook, string: KnownString) -> Iterator[tuple[VerdictDoubt, str]]:

@@ -106,6 +106,8 @@ export interface Verdict {
   target_m: number;
   /** which deviation decided */
   what: "deviation" | "projection" | null;
+  /** by which the toe may be off if the tube errs that read the last station alone */
+  unfound_cm: number;
   off: Off | null;
   steer: Steer | null;
 }
