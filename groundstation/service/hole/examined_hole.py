@@ -94,7 +94,14 @@ class ExaminedHole:
     @cached_property
     def shares(self) -> list[ErrorShare]:
         """Of what the variance at the toe is made."""
-        return toe_budget(self.adjusted, self.run.causes)
+        return [*toe_budget(self.adjusted, self.run.causes), *self._suspected(toe_weights(self.adjusted))]
+
+    def _suspected(self, weights: Array) -> list[ErrorShare]:
+        """Share of a suspicion in the variance of functionals (s + 1, 2, r) of the directions."""
+        if self.examination.supposed is None:
+            return []
+        moved = np.einsum("ka,kar->r", self.examination.suspected, weights)
+        return [ErrorShare(ShareSource.BLUNDER, -1, moved**2)]
 
     def share_name(self, share: ErrorShare) -> tuple[str, str]:
         """Source of a share, and the tube or joint that it is of."""

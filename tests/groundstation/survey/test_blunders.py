@@ -184,7 +184,7 @@ def test_a_look_that_may_be_the_first_of_a_step_is_a_doubt() -> None:
 
 
 @pytest.mark.slow
-def test_a_suspicion_is_not_told_and_stands_in_the_covariance() -> None:
+def test_a_suspicion_is_not_told_moves_no_direction_and_stands_in_the_covariance() -> None:
     """The encoder slips by 6 deg at the third stop, where the hole hardly leans: hardly anything shows it."""
     drawn = draw_string(39, "encoder_slipped", 6.0)
     found = examined(drawn)
@@ -192,6 +192,12 @@ def test_a_suspicion_is_not_told_and_stands_in_the_covariance() -> None:
     assert found.blunders == ()
     assert found.suspicion is not None
     assert found.suspicion.best.hypothesis == Hypothesis(K.ENCODER_SLIPPED, (), 2)
+    plain = adjust_hole(drawn.looks, drawn.string, drawn.path)
+    np.testing.assert_allclose(found.adjusted.now.tangents, plain.now.tangents, atol=1e-5)
+    assert found.supposed is not None
+    turned = found.supposed.now.tangents - found.adjusted.now.tangents
+    np.testing.assert_allclose(np.linalg.norm(found.suspected, axis=1), np.linalg.norm(turned, axis=1), rtol=1e-3)
+    assert np.linalg.norm(turned, axis=1).max() > 2.0 * np.sqrt(np.trace(plain.covs[-1, :2, :2]))
     assert toe_departure(found, drawn) < 13.8  # one in a thousand of chi-square with two degrees of freedom
 
 
