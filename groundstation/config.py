@@ -58,6 +58,10 @@ class GroundConfig(BaseModel):
     )
     stick_up_m: float = Field(0.0, description="of the zero of the depth over the collar")
     stick_up_std_m: Positive | None = None
+    north_check_deg: float | None = Field(None, description="a second bearing of the encoder's zero, taken by itself")
+    north_check_std_deg: Positive | None = None
+    stick_up_check_m: float | None = Field(None, description="a second reading of it: the bit at the collar's edge")
+    stick_up_check_std_m: Positive | None = None
     mount_tilt_std_deg: Positive | None = Field(
         None, description="of an IMU against its tube's axis until it is aligned; as mounted, 0.5, if absent"
     )
@@ -103,6 +107,9 @@ class GroundConfig(BaseModel):
         for name, is_told in told.items():
             if is_told and getattr(self, name) is None:
                 raise PydanticCustomError("told", "expected {name} beside the value that it is of", {"name": name})
+        for value, std in (("north_check_deg", "north_check_std_deg"), ("stick_up_check_m", "stick_up_check_std_m")):
+            if (getattr(self, value) is None) != (getattr(self, std) is None):
+                raise PydanticCustomError("check", "expected {value} and {std} together", {"value": value, "std": std})
         return self
 
     @property

@@ -61,7 +61,7 @@ def adjusted_stations(
     turned_back, mds = [below[place].md for place in back.tolist()], [one.md for one in below]
     if examined is None:
         return AdjustedStations(told, dict(zip(mds, alone, strict=True)), [], turned_back)
-    collar, *found = directions_of(examined.adjusted, shared, north)
+    collar, *found = directions_of(examined.examination, shared, north)
     moved = moved_stations(examined, below)
     return AdjustedStations(collar, dict(zip(mds, found, strict=True)), moved, turned_back, examined.adjusted)
 

@@ -15,6 +15,7 @@ from groundstation.survey.adjustment.blunder_words import say_blunder
 from groundstation.survey.adjustment.blunders import Blunder, Examination, chance_of_one
 from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, prior_shares, toe_budget
 from groundstation.survey.adjustment.hypotheses import Hypothesis
+from groundstation.survey.adjustment.last_look import LastLook, look_alone
 from groundstation.survey.adjustment.least_found import LARGEST, possible_mistakes
 from groundstation.survey.adjustment.next_stop import NextStop, plan_stop
 from groundstation.survey.adjustment.reliability import Reliability, measure_reliability
@@ -93,7 +94,14 @@ class ExaminedHole:
     @cached_property
     def shares(self) -> list[ErrorShare]:
         """Of what the variance at the toe is made."""
-        return toe_budget(self.adjusted, self.run.causes)
+        return [*toe_budget(self.adjusted, self.run.causes), *self._suspected(toe_weights(self.adjusted))]
+
+    def _suspected(self, weights: Array) -> list[ErrorShare]:
+        """Share of a suspicion in the variance of functionals (s + 1, 2, r) of the directions."""
+        if self.examination.supposed is None:
+            return []
+        moved = np.einsum("ka,kar->r", self.examination.suspected, weights)
+        return [ErrorShare(ShareSource.BLUNDER, -1, moved**2)]
 
     def share_name(self, share: ErrorShare) -> tuple[str, str]:
         """Source of a share, and the tube or joint that it is of."""
@@ -125,6 +133,11 @@ class ExaminedHole:
     def costs(self) -> list[BlunderCost | None]:
         """What each blunder costs at the toe."""
         return cost_blunders(self.examination)
+
+    @cached_property
+    def last_look(self) -> LastLook | None:
+        """What stands on the lowest tube's last look alone; None where another has read the last station too."""
+        return look_alone(self.adjusted, self.run, chance_of_one(self.adjusted.looks, self.run))
 
     @cached_property
     def reliabilities(self) -> list[Reliability]:

@@ -20,7 +20,7 @@ from groundstation.service.hole.history import SAME_STOP
 from groundstation.service.hole.resolved_stops import ResolvedStops, Rows
 from groundstation.service.hole.string_prior import Hanging, causes_of_turns, prior_of_string
 from groundstation.survey.adjustment.adjust import adjust_hole
-from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.blunders import Examination
 from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.fusion.packed import Packed
@@ -35,7 +35,9 @@ Places = npt.NDArray[np.intp]
 MANY = 1500  # looks, from which on an adjustment begins where an earlier one ended
 STOPS_KEPT = 16  # stops of the string between such beginnings
 OWN_SHARE = 0.2  # of a tube's noise that is taken from the stop itself: the variance of 32 readings is not exact
-FURTHER = 2 + 30  # columns of gravity, of north, and of what is wrong: two explanations of five blunders
+FURTHER = (
+    3 + 30
+)  # columns of gravity, of north, of a suspicion, and of what is wrong: two explanations of five blunders
 LOUD = 2.5  # times a tube's noise, from which on a stop is one at which it was shaken
 
 
@@ -61,6 +63,10 @@ class HoleAdjustment:
     def take_found(self) -> tuple[int, ExaminedHole] | None:
         """What a search of its own came to since the last call, with the number of its newest survey."""
         return None if self._search is None else self._search.take_found()
+
+    def wait_for_search(self) -> bool:
+        """Wait until the search that runs has ended; whether one ran."""
+        return self._search is not None and self._search.wait()
 
     def make_room(self, chain: int) -> None:
         """Have the columns that a chain may need, in the order in which stops come and not in that of questions."""
@@ -193,15 +199,20 @@ def noise_of(seen: Rows, tube_of: Places) -> Array:
     return np.where(own > LOUD * usual, own, OWN_SHARE * own + (1.0 - OWN_SHARE) * usual)
 
 
-def directions_of(adjusted: Adjusted, shared: SharedErrors, north_std: float) -> list[SphereDirection]:
+def directions_of(examination: Examination, shared: SharedErrors, north_std: float) -> list[SphereDirection]:
     """Directions of the collar and the stations below it, from the top down.
 
     The encoder's zero against north (rad) turns them all about the vertical and is in no look: it is one more column.
+    So is what is suspected: by how much it would move them, as one standard deviation.
     """
+    adjusted = examination.adjusted
     bases, tangents = adjusted.bases, adjusted.now.tangents
     own = np.swapaxes(bases, 1, 2) @ adjusted.own_covs[:, :2, :2] @ bases
     turned = north_std * np.stack([-tangents[:, 1], tangents[:, 0], np.zeros(len(tangents))], axis=1)
-    columns = np.concatenate([np.swapaxes(bases, 1, 2) @ adjusted.columns[:, :2], turned[:, :, None]], axis=2)
+    of_looks = adjusted.columns[:, :2]
+    if examination.supposed is not None:
+        of_looks = np.concatenate([of_looks, examination.suspected[:, :, None]], axis=2)
+    columns = np.concatenate([np.swapaxes(bases, 1, 2) @ of_looks, turned[:, :, None]], axis=2)
     places = shared.adjusted_places(columns.shape[2])
     width = shared.count
     found = []

@@ -148,8 +148,16 @@ class SurveyedHole:
         self._is_behind = False
 
     def _end_stop(self) -> None:
-        """Keep what is known at the end of a stop. What is kept of one already is judged as it was judged then."""
+        """Keep what is known at the end of a stop. What is kept of one already is judged as it was judged then.
+
+        A search of its own that still runs is waited for, or what is kept would lack what it finds: a stop ends when
+        the next one begins, so it hardly ever does.
+        """
         history = self._history
+        if self._is_adjusted and not self._is_behind:
+            self.settle()
+            while self._adjustment.wait_for_search():
+                self.adopt_found()
         if not (self._is_adjusted and self._is_behind):
             history.add(self.deviations, self.projection)
         elif (kept := history.take_over(len(self._stops))) is not None:
