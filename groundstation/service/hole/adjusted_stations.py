@@ -33,15 +33,24 @@ class AdjustedStations:
     collar : direction there
     directions : by depth (m), from the top down
     moved : where the hole moved
-    turned_back : depths (m) of stations whose surveys point back against those of the one above
     found : the adjustment; None where the surveys have no solution in common
+    told : direction at the collar as it was told
+    below : stations below it, from the top down
     """
 
     collar: Direction
     directions: dict[float, Direction] = field(default_factory=dict)
     moved: list[Moved] = field(default_factory=list)
-    turned_back: list[float] = field(default_factory=list)
     found: Adjusted | None = None
+    told: Direction | None = None
+    below: Sequence[SurveyStation] = ()
+
+    def turned_back(self) -> list[float]:
+        """Depths (m) of stations whose surveys point back against those of the one above."""
+        above = self.collar if self.told is None else self.told
+        tangents = tangents_of([above, *map(fused_alone, self.below)])
+        back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
+        return [self.below[place].md for place in back.tolist()]
 
 
 def adjusted_stations(
@@ -55,15 +64,18 @@ def adjusted_stations(
     told : direction at the collar
     north : rad, standard deviation of the encoder's zero
     """
-    alone = [one.fused(Weighting.BAYES) for one in below]
-    tangents = tangents_of([told, *alone])
-    back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
-    turned_back, mds = [below[place].md for place in back.tolist()], [one.md for one in below]
+    mds = [one.md for one in below]
     if examined is None:
-        return AdjustedStations(told, dict(zip(mds, alone, strict=True)), [], turned_back)
+        alone = dict(zip(mds, map(fused_alone, below), strict=True))
+        return AdjustedStations(told, alone, told=told, below=below)
     collar, *found = directions_of(examined.adjusted, shared, north)
     moved = moved_stations(examined, below)
-    return AdjustedStations(collar, dict(zip(mds, found, strict=True)), moved, turned_back, examined.adjusted)
+    return AdjustedStations(collar, dict(zip(mds, found, strict=True)), moved, examined.adjusted, told, below)
+
+
+def fused_alone(station: SurveyStation) -> Direction:
+    """What the surveys of a station say by themselves."""
+    return station.fused(Weighting.BAYES)
 
 
 def learnt_wander(found: Adjusted, curvature_length: float) -> tuple[LegWander, Array]:

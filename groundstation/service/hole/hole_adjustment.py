@@ -17,8 +17,9 @@ from groundstation.config import GroundConfig
 from groundstation.service.hole.blunder_search import BlunderSearch, LookedAt, RunApart
 from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import SAME_STOP
+from groundstation.service.hole.hung_chains import HungChains
 from groundstation.service.hole.resolved_stops import ResolvedStops, Rows
-from groundstation.service.hole.string_prior import Hanging, causes_of_turns, prior_of_string
+from groundstation.service.hole.string_prior import Hanging, prior_of_string
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks, PathPrior, StartingPoint, StringPrior
@@ -53,6 +54,8 @@ class HoleAdjustment:
         self._search: BlunderSearch | None = None
         self._kept: tuple[bytes, StartingPoint] | None = None  # where an earlier adjustment ended, and of what looks
         self._hanging, self._met = Hanging(), set[int]()  # chains of which there was a stop
+        mount_var = math.radians(config.mount_std_deg) ** 2
+        self._chains, self._chains_before = HungChains(shared, mount_var), HungChains(shared, mount_var)
 
     def search_apart(self, run_apart: RunApart) -> None:
         """From now on look for what is wrong beside everything else."""
@@ -91,20 +94,18 @@ class HoleAdjustment:
             return None
         path = self.path_of(mds, collar)
         forces = stops.mean_forces(rows)
-        seen = self._looked_at(table[rows], forces, station_of_row[rows], path)
-        seen = replace(seen, start=self._start(table[rows], seen))
+        seen = self._looked_at(table[rows], forces, station_of_row[rows], path, self._chains)
+        seen = replace(seen, start=self._start(rows, table[rows], seen))
         return seen.examine() if self._search is None else self._search.examine(number, seen)
 
-    def _looked_at(self, seen: Rows, forces: Array, station: Places, path: PathPrior) -> LookedAt:
+    def _looked_at(self, seen: Rows, forces: Array, station: Places, path: PathPrior, chains: HungChains) -> LookedAt:
         """Looks of rows of the table in the order of time, with their mean forces, at their stations along a path."""
         numbers, which = number_values(seen["chain"])
-        chains, hanging = [self._shared.chain(number) for number in numbers], Hanging()
-        hung = np.array([hanging.add_chain(chain) for chain in chains], np.intp)[which]
+        hung = chains.hung(numbers)[which]
         systematic = seen["systematic_var"]
-        least = np.full(len(chains), math.inf)
+        least = np.full(len(numbers), math.inf)
         np.minimum.at(least, which, systematic)
-        mount_var = math.radians(self._config.mount_std_deg) ** 2
-        causes = causes_of_turns(hanging, chains, least.tolist(), mount_var)
+        causes = chains.causes(least)
         tube_of, make_up = np.ascontiguousarray(hung[:, 0]), np.ascontiguousarray(hung[:, 1])
         # what a node doubts beyond its mount and joints, as after a slip, is of that look
         unknown = UNKNOWN_YAW_VAR * (seen["trust"] == Trust.UNKNOWN_YAW) + (systematic - least[which])
@@ -114,8 +115,8 @@ class HoleAdjustment:
         first = np.searchsorted(stop, np.arange(stop[-1] + 1))
         deepest = np.maximum.reduceat(path.md[station], first)
         run = RunOfStops(deepest, seen["at"][first], path.md, causes)
-        string = prior_of_string(self._config, len(hanging.tubes), causes)
-        return LookedAt(looks, string, path, run, tuple(str(tube) for _, tube in hanging.tubes))
+        tubes = tuple(str(tube) for _, tube in chains.hanging.tubes)
+        return LookedAt(looks, prior_of_string(self._config, len(tubes), causes), path, run, tubes)
 
     def path_of(self, mds: Array, collar: Direction) -> PathPrior:
         """What is known of the path before."""
@@ -129,7 +130,7 @@ class HoleAdjustment:
             self._config.curvature_length,
         )
 
-    def _start(self, rows: Rows, seen: LookedAt) -> StartingPoint | None:
+    def _start(self, numbers: Places, rows: Rows, seen: LookedAt) -> StartingPoint | None:
         """Where the adjustment of many looks begins; None for that of a few, which begins with the looks alone."""
         looks, path = seen.looks, seen.path
         if len(looks) < MANY:
@@ -139,9 +140,12 @@ class HoleAdjustment:
             return None  # many tubes, and few stops yet
         used, station = np.unique(looks.station[earlier], return_inverse=True)
         above = replace(path, md=path.md[np.concatenate([[0], used])])
-        made_of = rows[earlier].tobytes() + looks.force[earlier].tobytes() + above.md.tobytes()
+        # a row keeps its readings, and gets another number of its tube where it is revised
+        made_of = b"".join(one.tobytes() for one in (numbers[earlier], rows["sequence"][earlier], station, above.md))
         if self._kept is None or self._kept[0] != made_of:
-            part = self._looked_at(rows[earlier], looks.force[earlier], station.astype(np.intp) + 1, above)
+            part = self._looked_at(
+                rows[earlier], looks.force[earlier], station.astype(np.intp) + 1, above, self._chains_before
+            )
             self._kept = made_of, adjust_hole(part.looks, part.string, above).now
         return grown_start(self._kept[1], used, len(path.md), seen.string)
 
@@ -175,9 +179,11 @@ def grown_start(start: StartingPoint, used: Places, count: int, string: StringPr
 
 def number_values(values: npt.NDArray[np.uint32]) -> tuple[list[int], Places]:
     """Different values in the order of their coming, and the place (n,) of each among them."""
-    different = dict.fromkeys(values.tolist())
-    place = {value: number for number, value in enumerate(different)}
-    return list(different), np.array([place[value] for value in values.tolist()], np.intp)
+    different, first, which = np.unique(values, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    place = np.empty(len(order), np.intp)
+    place[order] = np.arange(len(order))
+    return different[order].tolist(), place[which]
 
 
 def stop_numbers(at: Array) -> Places:

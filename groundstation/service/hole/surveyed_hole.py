@@ -217,7 +217,7 @@ class SurveyedHole:
         The adjustment of the hole leaves such a survey out, and what is drawn points on.
         """
         self.settle()
-        return self._stands.turned_back if self._is_adjusted else self._trajectory.turned_back
+        return self._stands.turned_back() if self._is_adjusted else self._trajectory.turned_back
 
     def direction_of(self, station: SurveyStation) -> Direction:
         """Direction of the hole at a station, the transport of the string in it."""
@@ -238,8 +238,9 @@ class SurveyedHole:
         """
         if self._examined[0] != self.version:
             below = self._below
-            place = {id(one): number for number, one in enumerate(below, 1)}
-            station_of_row = np.array([place.get(id(one), 0) for one in self._station_of], np.intp)
+            station_of_row = np.zeros(len(self._stops), np.intp)
+            for place, one in enumerate(below, 1):
+                station_of_row[one.stops.rows] = place
             mds = np.array([one.md for one in below])
             try:
                 found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar, self.newest)
