@@ -207,7 +207,7 @@ def directions_of(adjusted: Adjusted, shared: SharedErrors, north_std: float) ->
     bases, tangents = adjusted.bases, adjusted.now.tangents
     own = np.swapaxes(bases, 1, 2) @ adjusted.own_covs[:, :2, :2] @ bases
     turned = north_std * np.stack([-tangents[:, 1], tangents[:, 0], np.zeros(len(tangents))], axis=1)
-    columns = np.concatenate([np.swapaxes(bases, 1, 2) @ adjusted.columns[:, :2], turned[:, :, None]], axis=2)
+    columns = np.concatenate([np.swapaxes(bases, 1, 2) @ adjusted.direction_columns, turned[:, :, None]], axis=2)
     places = shared.adjusted_places(columns.shape[2])
     width = shared.count
     found = []

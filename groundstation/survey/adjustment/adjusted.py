@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.kernels.path_elimination import path_covariances, reduce_right, substitute_path
+from groundstation.survey.adjustment.linear_solution import LinearSolution
 from groundstation.survey.adjustment.looks import (
     OF_TUBE,
     TURN,
@@ -32,25 +33,6 @@ class Linearised:
     residuals: Array
     squares: Array
     gravity_at: int  # place of gravity among what stations have in common, behind the tubes
-
-
-@dataclass(frozen=True, slots=True)
-class LinearSolution:
-    """The factorised chain, the covariance (p, p) of what stations have in common, and the step."""
-
-    diagonal: Array
-    tied: Array
-    coupled: Array  # (s + 1, 4, p)
-    cov: Array
-    common: Array  # (p,)
-    states: Array  # (s + 1, 4)
-
-    @property
-    def step(self) -> float:
-        """Largest step of an unknown in its standard deviations, at most as the equations know them; NaN if one is."""
-        of_common = np.max(np.abs(self.common) / np.sqrt(np.diag(self.cov)), initial=0.0)
-        rigid = np.einsum("kab,kab->ka", self.diagonal, self.diagonal)  # of what is left of each block
-        return float(np.maximum(of_common, np.max(np.abs(self.states) * np.sqrt(rigid))))
 
 
 @dataclass(frozen=True)  # with a dictionary, for what is worked out once
@@ -105,6 +87,12 @@ class Adjusted:
         return np.asarray((flat @ self.common_root).reshape(self.by_common.shape))
 
     @cached_property
+    def direction_columns(self) -> Array:
+        """Change of every direction (s + 1, 2, p), likewise: half of the work, where curvatures are not asked for."""
+        flat = np.ascontiguousarray(self.by_common[:, :2]).reshape(-1, len(self.common_cov))
+        return np.asarray((flat @ self.common_root).reshape(-1, 2, len(self.common_cov)))
+
+    @cached_property
     def common_root(self) -> Array:
         """Lower triangular root (p, p) of that covariance."""
         return np.asarray(np.linalg.cholesky(self.common_cov))
@@ -113,6 +101,11 @@ class Adjusted:
     def covs(self) -> Array:
         """Covariances (s + 1, 4, 4) of direction and curvature at collar and stations."""
         return np.asarray(self.own_covs + self.columns @ np.swapaxes(self.columns, 1, 2))
+
+    def cov_at(self, place: int) -> Array:
+        """Covariance (4, 4) of direction and curvature at one place from the collar down."""
+        columns = self.by_common[place] @ self.common_root
+        return np.asarray(self.own_covs[place] + columns @ columns.T)
 
     @cached_property
     def left(self) -> Array:
