@@ -131,13 +131,16 @@ def solve_equations(
     equations = gather_equations(looks, linear, of_path, known, departure, extra)
     diagonal, tied, coupled, in_common = equations.diagonal, equations.tied, equations.coupled, equations.in_common
     eliminate_path(diagonal, tied, coupled)
-    wide = coupled.reshape(-1, coupled.shape[2])
+    wide, size, own = coupled.reshape(-1, coupled.shape[2]), len(known), coupled[:, :, -1]
+    whole = in_common[:size, :size].copy()
     in_common -= wide.T @ wide
-    size, own = len(known), coupled[:, :, -1]
     left = InCommon(in_common[:size, :size], in_common[:size, size])
     states = (own - coupled[:, :, :size] @ left.step)[:, :, None].copy()
     substitute_path(diagonal, tied, states)
-    return LinearSolution(diagonal, tied, coupled[:, :, :size], left, states[:, :, 0], float(np.sum(own * own)))
+    gain = float(np.sum(own * own))
+    return LinearSolution(
+        diagonal, tied, coupled[:, :, :size], left, states[:, :, 0], gain, equations.at_station, whole
+    )
 
 
 def gather_equations(
@@ -162,7 +165,7 @@ def gather_equations(
     diagonal[:, :2, :2] += at_station
     coupled[:, :2] = by_direction
     coupled[:, :, size] += right
-    return Equations(diagonal, tied, coupled, in_common)
+    return Equations(diagonal, tied, coupled, in_common, at_station)
 
 
 def _stepped(now: StartingPoint, bases: Array, solution: LinearSolution) -> StartingPoint:

@@ -134,10 +134,12 @@ class Adjusted:
         right = np.zeros((*self.solution.diagonal.shape[:2], directions.shape[2]))
         right[:, :2] = directions
         reduce_right(self.solution.diagonal, self.solution.tied, right)
-        of_path = np.einsum("jap,jar->pr", self.solution.coupled, right)
+        width = right.shape[2]
+        of_path = self.solution.coupled.reshape(-1, len(self.common_cov)).T @ right.reshape(-1, width)
         substitute_path(self.solution.diagonal, self.solution.tied, right)
         found = self.common_cov @ (common - of_path)
-        return right + self.by_common @ found, found
+        states = right + (self.by_common.reshape(-1, len(found)) @ found).reshape(right.shape)
+        return states, found
 
     @cached_property
     def redundancies(self) -> Array:
@@ -163,4 +165,5 @@ class Adjusted:
     @property
     def redundancy(self) -> float:
         """What that sum is to be."""
-        return float(np.einsum("kab,kba->", self.redundancies, np.linalg.inv(self.linear.weights)))
+        told = self.solution.told_by(self.own_covs[:, :2, :2], self.direction_columns, self.known)
+        return len(self.looks) * self.linear.weights.shape[1] - told

@@ -107,13 +107,13 @@ def _of_looks(found: Adjusted, moved: Array) -> list[ErrorShare]:
     """Noise of the force, play and noise of the yaw; what a look that counts less adds is theirs in proportion."""
     looks, linear = found.looks, found.linear
     pulled = linear.weights @ moved
-    whole = np.einsum("kar,kar->kr", pulled, moved)
-    play = np.swapaxes(linear.jacobians[:, :, 5:7], 1, 2) @ pulled
-    yaw = np.einsum("ka,kar->kr", linear.jacobians[:, :, 7], pulled)
+    whole = np.sum(pulled * moved, axis=1)
+    turned = np.swapaxes(linear.jacobians[:, :, 5:8], 1, 2) @ pulled
+    squares = turned * turned
     parts = np.stack([
-        looks.force_var[:, None] * np.sum(pulled**2, axis=1),
-        found.now.play_var * np.sum(play**2, axis=1),
-        looks.yaw_var[:, None] * yaw**2,
+        looks.force_var[:, None] * np.sum(pulled * pulled, axis=1),
+        found.now.play_var * np.sum(squares[:, :2], axis=1),
+        looks.yaw_var[:, None] * squares[:, 2],
     ])  # fmt: skip
     total = parts.sum(axis=0)
     shares = np.sum(parts * np.where(total > 0.0, whole / np.where(total > 0.0, total, 1.0), 0.0), axis=1)

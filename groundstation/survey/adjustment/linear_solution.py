@@ -73,6 +73,8 @@ class LinearSolution:
     in_common : of what stations have in common
     states : (s + 1, 4), step of directions and curvatures
     of_path : by how much the sum of squares is less for a step of these alone
+    at_station, whole : (s + 1, 2, 2) and (p, p), information of the looks on each direction, and of looks and what was
+        known before on what stations have in common, before the path was taken out
     """
 
     diagonal: Array
@@ -81,6 +83,8 @@ class LinearSolution:
     in_common: InCommon
     states: Array
     of_path: float
+    at_station: Array
+    whole: Array
 
     @property
     def cov(self) -> Array:
@@ -98,6 +102,21 @@ class LinearSolution:
         of_common = np.max(np.abs(self.common) / np.sqrt(np.diag(self.cov)), initial=0.0)
         rigid = np.einsum("kab,kab->ka", self.diagonal, self.diagonal)  # of what is left of each block
         return float(np.maximum(of_common, np.max(np.abs(self.states) * np.sqrt(rigid))))
+
+    def told_by(self, own_covs: Array, columns: Array, known: Array) -> float:
+        """How many numbers the looks tell: the trace of their information times the covariance of all unknowns.
+
+        Of directions and what is in common that is summed station by station; what they have with each other is
+        tr(B^T Q) with Q = S^-1 B C, which is what taking out the path has taken from the information in common.
+
+        Parameters
+        ----------
+        own_covs, columns : (s + 1, 2, 2) and (s + 1, 2, p), covariances of the directions were all else known, and
+            their change for one standard deviation of independent errors in common
+        known : (p, p), information on what is in common before any look
+        """
+        of_directions = float(np.sum(self.at_station * (own_covs + columns @ np.swapaxes(columns, 1, 2))))
+        return of_directions + 2.0 * len(known) - float(np.sum((self.whole + known) * self.cov))
 
     @property
     def decrement(self) -> float:

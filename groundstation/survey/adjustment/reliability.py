@@ -18,9 +18,9 @@ import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
-from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, Hypothesis, effect_of
+from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, Hypothesis
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
-from groundstation.survey.adjustment.scores import MOST_AT_ONCE, UNTOLD, free_information
+from groundstation.survey.adjustment.scores import MOST_AT_ONCE, UNTOLD, columns_together, free_information
 from groundstation.survey.adjustment.toe_weights import moved_looks
 
 Array = npt.NDArray[np.float64]
@@ -108,12 +108,10 @@ def _of_alike(
     needed: float,
 ) -> Iterator[Reliability]:
     """Reliability of blunders of one width q, which are found from a non-centrality on."""
-    columns = np.zeros((len(found.looks), 3, len(part), WIDTHS[part[0].kind]))
-    for place, one in enumerate(part):
-        rows, effect = effect_of(one, found.looks, run, found.now, found.linear)
-        columns[rows, :, place] = effect
-    whole, free = free_information(found, np.arange(len(found.looks)), columns)
-    effects = np.einsum("kahq,kar->hqr", columns, moved)
+    rows, columns = columns_together(found, run, part)
+    whole, free = free_information(found, rows, columns)
+    flat = columns.reshape(3 * len(rows), -1)
+    effects = (flat.T @ moved[rows].reshape(len(flat), -1)).reshape(*columns.shape[2:], -1)
     for one, effect, its_whole, its_free in zip(part, effects, whole, free, strict=True):
         yield _of_one(one, effect, its_whole, its_free, sizes, needed)
 

@@ -58,18 +58,24 @@ def score_hypotheses(found: Adjusted, run: RunOfStops, hypotheses: Iterable[Hypo
 
 
 def _score_part(found: Adjusted, run: RunOfStops, part: Sequence[Hypothesis]) -> Score:
-    width = WIDTHS[part[0].kind]
-    columns = np.zeros((len(found.looks), 3, len(part), width))
-    touched = np.zeros(len(found.looks), bool)
-    for place, one in enumerate(part):
-        rows, effect = effect_of(one, found.looks, run, found.now, found.linear)
-        columns[rows, :, place] = effect
-        touched[rows] = True
-    rows = np.flatnonzero(touched)
+    rows, columns = columns_together(found, run, part)
     pulled = np.einsum("kab,kb->ka", found.linear.weights[rows], found.left[rows])
-    scores = np.einsum("kahq,ka->hq", columns[rows], pulled)
-    whole, free = free_information(found, rows, columns[rows])
+    scores = np.einsum("kahq,ka->hq", columns, pulled)
+    whole, free = free_information(found, rows, columns)
     return Score(tuple(part), *best_sizes(scores, whole, free))
+
+
+def columns_together(found: Adjusted, run: RunOfStops, part: Sequence[Hypothesis]) -> tuple[Places, Array]:
+    """Looks (r,) that hypotheses of one width q change, and the change (r, 3, h, q) of their force by each."""
+    effects = [effect_of(one, found.looks, run, found.now, found.linear) for one in part]
+    touched = np.zeros(len(found.looks), bool)
+    for rows, _ in effects:
+        touched[rows] = True
+    at, place_of = np.flatnonzero(touched), np.cumsum(touched) - 1
+    columns = np.zeros((len(at), 3, len(part), WIDTHS[part[0].kind]))
+    for place, (rows, effect) in enumerate(effects):
+        columns[place_of[rows], :, place] = effect
+    return at, columns
 
 
 def free_information(found: Adjusted, rows: Places, columns: Array) -> tuple[Array, Array]:
