@@ -21,6 +21,7 @@ from groundstation.survey.adjustment.looks import (
 )
 
 Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,19 +142,19 @@ class Adjusted:
         states = right + (self.by_common.reshape(-1, len(found)) @ found).reshape(right.shape)
         return states, found
 
-    @cached_property
-    def redundancies(self) -> Array:
-        """Part P_k (n, 3, 3) of the inverse covariance of every look that is free to contradict: W - W J Q J^T W."""
+    def free_parts(self, rows: Places) -> Array:
+        """Part P_k (r, 3, 3) of the inverse covariance of some looks that is free to contradict: W - W J Q J^T W."""
         from groundstation.survey.adjustment.kernels.free_parts import free_parts
 
-        found = np.empty((len(self.looks), 3, 3))
-        direction = np.ascontiguousarray(self.by_common[:, :2])
-        with_common = (direction.reshape(-1, len(self.common_cov)) @ self.common_cov).reshape(direction.shape)
+        looks, size = self.looks.part(rows), len(self.common_cov)
+        seen, station = np.unique(looks.station, return_inverse=True)
+        columns = self.direction_columns[seen]
+        of_direction = self.own_covs[seen, :2, :2] + columns @ np.swapaxes(columns, 1, 2)
+        with_common = (self.by_common[seen, :2].reshape(-1, size) @ self.common_cov).reshape(columns.shape)
+        found = np.empty((len(rows), 3, 3))
         free_parts(
-            self.looks.station, self.looks.tube, self.looks.make_up, self.linear.jacobians, self.linear.weights,
-            self.extra.columns,
-            OF_TUBE * self.string.count, self.covs[:, :2, :2].copy(),
-            with_common, self.common_cov, found,
+            station.astype(np.intp), looks.tube, looks.make_up, self.linear.jacobians[rows], self.linear.weights[rows],
+            self.extra.columns[rows], self.linear.gravity_at, of_direction, with_common, self.common_cov, found,
         )  # fmt: skip
         return found
 

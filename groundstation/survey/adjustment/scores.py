@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.hypotheses import WIDTHS, Hypothesis, effect_of
+from groundstation.survey.adjustment.hypotheses import OF_BEFORE, WIDTHS, Hypothesis, effect_of
 from groundstation.survey.adjustment.kernels.path_elimination import reduce_right
+from groundstation.survey.adjustment.looks import Looks
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 
 Array = npt.NDArray[np.float64]
@@ -67,15 +68,24 @@ def _score_part(found: Adjusted, run: RunOfStops, part: Sequence[Hypothesis]) ->
 
 def columns_together(found: Adjusted, run: RunOfStops, part: Sequence[Hypothesis]) -> tuple[Places, Array]:
     """Looks (r,) that hypotheses of one width q change, and the change (r, 3, h, q) of their force by each."""
-    effects = [effect_of(one, found.looks, run, found.now, found.linear) for one in part]
-    touched = np.zeros(len(found.looks), bool)
+    late = rows_since(found.looks, part)
+    looks, linear = found.looks.part(late), replace(found.linear, jacobians=found.linear.jacobians[late])
+    effects = [effect_of(one, looks, run, found.now, linear) for one in part]
+    touched = np.zeros(len(late), bool)
     for rows, _ in effects:
         touched[rows] = True
-    at, place_of = np.flatnonzero(touched), np.cumsum(touched) - 1
-    columns = np.zeros((len(at), 3, len(part), WIDTHS[part[0].kind]))
+    place_of = np.cumsum(touched) - 1
+    columns = np.zeros((int(touched.sum()), 3, len(part), WIDTHS[part[0].kind]))
     for place, (rows, effect) in enumerate(effects):
         columns[place_of[rows], :, place] = effect
-    return at, columns
+    return late[touched], columns
+
+
+def rows_since(looks: Looks, part: Sequence[Hypothesis]) -> Places:
+    """Looks that hypotheses may change: those since the first of them begins, where none is of what was before."""
+    if any(one.kind in OF_BEFORE for one in part):
+        return np.arange(len(looks))
+    return np.flatnonzero(looks.stop >= min(one.stop for one in part))
 
 
 def free_information(found: Adjusted, rows: Places, columns: Array) -> tuple[Array, Array]:
