@@ -167,4 +167,4 @@ class Adjusted:
     def redundancy(self) -> float:
         """What that sum is to be."""
         told = self.solution.told_by(self.own_covs[:, :2, :2], self.direction_columns, self.known)
-        return len(self.looks) * self.linear.weights.shape[1] - told
+        return float(self.linear.residuals.size - told)

@@ -36,8 +36,8 @@ def count_hypotheses(looks: Looks, run: RunOfStops) -> int:
 
 def _of_tubes(was_there: Truths, is_onset: Truths) -> int:
     """Of every tube by itself; ``was_there`` (m, k) says at which stops it looked."""
-    number = np.cumsum(was_there, axis=1)  # of its looks, from 1
-    left = number[:, -1:] - number
+    number: Places = np.cumsum(was_there, axis=1)  # of its looks, from 1
+    left: Places = number[:, -1:] - number
     counted = OF_LOOK + OF_LATER_LOOK * (number > 1) + (left >= FEWEST_TO_CREEP)
     return OF_TUBE_ALWAYS * len(was_there) + int(counted[was_there & is_onset].sum())
 

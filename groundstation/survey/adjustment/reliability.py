@@ -111,8 +111,7 @@ def _of_alike(
     rows, columns = columns_together(found, run, part)
     whole, free = _information(found, rows, columns)
     moved = found.linear.weights[rows] @ moved_looks(found, *spread, rows)  # W A Q w (k, 3, r)
-    flat = columns.reshape(3 * len(rows), -1)
-    effects = (flat.T @ moved.reshape(len(flat), -1)).reshape(*columns.shape[2:], -1)
+    effects = np.tensordot(columns, moved, axes=((0, 1), (0, 1)))
     values, vectors = np.linalg.eigh(free)
     is_told = values[:, 0] > UNTOLD * np.maximum(np.einsum("hqq->h", whole), 1e-300)
     safe = np.where(is_told[:, None], values, 1.0)
@@ -134,15 +133,16 @@ def _by_size(one: Hypothesis, by_one: Array, sizes: Mapping[BlunderKind, float])
 
 def _information(found: Adjusted, rows: Places, columns: Array) -> tuple[Array, Array]:
     """Information and the part that is free, as of ``free_information``; that of a single look is told by that look."""
-    is_in = columns.any(axis=(1, 3))  # (r, h)
+    is_in = np.asarray(columns.any(axis=(1, 3)))  # (r, h)
     alone = np.flatnonzero(is_in.sum(axis=0) == 1)
     others = np.setdiff1d(np.arange(columns.shape[2]), alone)
     whole, free = np.zeros((2, columns.shape[2], columns.shape[3], columns.shape[3]))
-    look = is_in[:, alone].argmax(axis=0)
-    effect = columns[look, :, alone]
-    back = np.swapaxes(effect, 1, 2)
-    whole[alone] = back @ found.linear.weights[rows[look]] @ effect
-    free[alone] = back @ found.free_parts(rows[look]) @ effect
+    if len(alone):
+        look = is_in[:, alone].argmax(axis=0)
+        effect = columns[look, :, alone]
+        back = np.swapaxes(effect, 1, 2)
+        whole[alone] = back @ found.linear.weights[rows[look]] @ effect
+        free[alone] = back @ found.free_parts(rows[look]) @ effect
     if len(others):
         touched = is_in[:, others].any(axis=1)
         whole[others], free[others] = free_information(found, rows[touched], columns[touched][:, :, others])

@@ -20,15 +20,6 @@ def toe_weights(found: Adjusted) -> Array:
     return leg_weights(found.path.md)[:, None, None] * found.linear.bases
 
 
-def position_weights(found: Adjusted) -> Array:
-    """Change (s + 1, 2, 3 (s + 1)) of the positions of collar and stations, each as that of ``toe_weights``."""
-    half = 0.5 * np.diff(found.path.md, prepend=0.0)
-    count = len(half)
-    above = np.arange(count)[:, None] < np.arange(count)
-    lengths = half[:, None] * (above | np.eye(count, dtype=bool)) + np.append(half[1:], 0.0)[:, None] * above
-    return np.asarray(np.einsum("kj,kai->kaji", lengths, found.linear.bases).reshape(count, 2, -1))
-
-
 def leg_weights(md: Array) -> Array:
     """Length (s + 1,) of the hole, m, that each direction stands for."""
     half = 0.5 * np.diff(md)
