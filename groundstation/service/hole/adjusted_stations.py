@@ -12,6 +12,7 @@ import numpy.typing as npt
 from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.hole_adjustment import directions_of
 from groundstation.service.hole.movement import Moved, moved_stations
+from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.fusion.fusion import Weighting
@@ -36,6 +37,7 @@ class AdjustedStations:
     found : the adjustment; None where the surveys have no solution in common
     told : direction at the collar as it was told
     below : stations below it, from the top down
+    stops : theirs
     """
 
     collar: Direction
@@ -44,9 +46,13 @@ class AdjustedStations:
     found: Adjusted | None = None
     told: Direction | None = None
     below: Sequence[SurveyStation] = ()
+    stops: ResolvedStops | None = None
 
     def turned_back(self) -> list[float]:
         """Depths (m) of stations whose surveys point back against those of the one above."""
+        grown = [station for station in self.below if station.lacks_newest]
+        if grown and self.stops is not None:
+            SurveyStation.fuse_together(grown, self.stops)
         above = self.collar if self.told is None else self.told
         tangents = tangents_of([above, *map(fused_alone, self.below)])
         back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
@@ -54,7 +60,12 @@ class AdjustedStations:
 
 
 def adjusted_stations(
-    examined: ExaminedHole | None, below: Sequence[SurveyStation], told: Direction, shared: SharedErrors, north: float
+    examined: ExaminedHole | None,
+    below: Sequence[SurveyStation],
+    told: Direction,
+    shared: SharedErrors,
+    north: float,
+    stops: ResolvedStops,
 ) -> AdjustedStations:
     """Stations of an adjusted hole; without a solution each stands for what its own surveys say.
 
@@ -63,14 +74,15 @@ def adjusted_stations(
     below : stations below the collar, from the top down
     told : direction at the collar
     north : rad, standard deviation of the encoder's zero
+    stops : of the stations
     """
     mds = [one.md for one in below]
     if examined is None:
         alone = dict(zip(mds, map(fused_alone, below), strict=True))
-        return AdjustedStations(told, alone, told=told, below=below)
+        return AdjustedStations(told, alone, told=told, below=below, stops=stops)
     collar, *found = directions_of(examined.adjusted, shared, north)
     moved = moved_stations(examined, below)
-    return AdjustedStations(collar, dict(zip(mds, found, strict=True)), moved, examined.adjusted, told, below)
+    return AdjustedStations(collar, dict(zip(mds, found, strict=True)), moved, examined.adjusted, told, below, stops)
 
 
 def fused_alone(station: SurveyStation) -> Direction:

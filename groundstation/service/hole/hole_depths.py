@@ -58,13 +58,13 @@ class HoleDepths:
         told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()} if stds else {}
         found, places_of = {}, self._stops.depth_places.__getitem__
         for one in stations:
-            made_of = (one.count, one.revised, self._setup.version)
+            made_of = (len(one.stops.rows), one.revised, self._setup.version)
             known = self._columns.get(one.md)
             if known is None or known[0] != made_of:  # what all of its readings share is as it was
                 places = [*map(places_of, one.stops.rows)]
                 columns = mean_depth(one.md, places, errors, self._config.tube_length, told).columns
                 known = self._columns[one.md] = made_of, columns
-            found[one.md] = StationDepth(known[1], errors.reading_std**2 / one.count)
+            found[one.md] = StationDepth(known[1], errors.reading_std**2 / made_of[0])
         return found
 
     def _learnt(self) -> DepthErrors:

@@ -289,7 +289,7 @@ class SurveyedHole:
     @property
     def toe_by_depth(self) -> Array:
         """Variance (3,), m^2, of the last position by what is not known of depths."""
-        return depth_variance_at_toe(self.trajectory, self._shared)
+        return depth_variance_at_toe(self.trajectory)
 
     def place_of(self, station: SurveyStation) -> int:
         """Place of a station in the trajectory; that of the collar for one at its depth."""
@@ -318,7 +318,8 @@ class SurveyedHole:
         self._touched, below = {}, self._below
         for station in self._stations:
             station.forget_view()
-        self._stands = adjusted_stations(self.examined, below, self._collar, self._shared, north_std(self._setup))
+        north = north_std(self._setup)
+        self._stands = adjusted_stations(self.examined, below, self._collar, self._shared, north, self._stops)
         self._trajectory = self._drawn_from(self._stands.collar)
         if self._stands.found is not None:
             self._trajectory.bend_as(*learnt_wander(self._stands.found, self._config.curvature_length))
