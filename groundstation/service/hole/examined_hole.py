@@ -13,14 +13,15 @@ from groundstation.survey.adjustment.blunder_cost import BlunderCost, cost_blund
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunder_words import say_blunder
 from groundstation.survey.adjustment.blunders import Blunder, Examination, chance_of_one
-from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, prior_shares, toe_budget
+from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, toe_budget
 from groundstation.survey.adjustment.hypotheses import Hypothesis
 from groundstation.survey.adjustment.last_look import LastLook, look_alone
 from groundstation.survey.adjustment.least_found import LARGEST, possible_mistakes
 from groundstation.survey.adjustment.next_stop import NextStop, plan_stop
+from groundstation.survey.adjustment.position_shares import position_shares
 from groundstation.survey.adjustment.reliability import Reliability, measure_reliability
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
-from groundstation.survey.adjustment.toe_weights import position_weights, toe_weights
+from groundstation.survey.adjustment.toe_weights import toe_weights
 from groundstation.survey.fusion.shared import KINDS
 
 Array = npt.NDArray[np.float64]
@@ -115,12 +116,12 @@ class ExaminedHole:
     def position_variances(self) -> dict[str, Array]:
         """Variances (s + 1, 3), m^2, of collar and stations to north, east and down by what looks have in common."""
         found: dict[str, Array] = {}
-        for share in prior_shares(self.adjusted, position_weights(self.adjusted), self.run.causes):
+        for share in position_shares(self.adjusted, self.run.causes):
             name = SOURCE_NAMES.get(share.source)
             if share.source is ShareSource.TURN:
                 name = KINDS.get(self.share_name(share)[0], "joints")
             if name is not None:
-                found[name] = found.get(name, 0.0) + np.maximum(share.variances, 0.0).reshape(-1, 3)
+                found[name] = found.get(name, 0.0) + np.maximum(share.variances, 0.0)
         return found
 
     @cached_property

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.adjustment.adjusted import Adjusted, Linearised, LinearSolution
+from groundstation.survey.adjustment.adjusted import Adjusted, Linearised
 from groundstation.survey.adjustment.curvature_size import learnt_curvature
 from groundstation.survey.adjustment.equations import (
     Equations,
@@ -25,6 +25,7 @@ from groundstation.survey.adjustment.equations import (
 )
 from groundstation.survey.adjustment.kernels.observations import add_looks, linearise_looks
 from groundstation.survey.adjustment.kernels.path_elimination import eliminate_path, substitute_path
+from groundstation.survey.adjustment.linear_solution import InCommon, LinearSolution
 from groundstation.survey.adjustment.looks import OF_TUBE, FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.play import PLAY_KNOWN_AS, faster_play, learnt_play
 from groundstation.survey.adjustment.sphere import carried_bases, step_about_vertical
@@ -85,6 +86,7 @@ def adjust_hole(
     if len(now.extra) != len(extra.std):
         now = replace(now, extra=np.zeros(len(extra.std)))
     known, is_learnt = string_information(string, extra), now.is_learnt
+    is_settled = is_learnt  # where it begins: so what is known of each unknown beside the others is no matter
     turns = poor_yaws(looks, len(path.md))
     is_bent, tried, swing = is_learnt, list[tuple[float, float]](), Swing()
     for again in range(ITERATIONS + FURTHER):
@@ -93,7 +95,8 @@ def adjust_hole(
         solution = solve_equations(
             looks, linear, path_equations(path, now, bases), known, string_departure(string, now), extra
         )
-        if not np.isfinite(solution.step):
+        step = solution.decrement if is_settled else solution.step
+        if not np.isfinite(step):
             raise np.linalg.LinAlgError("expected a step of the unknowns, got numbers that are none")
         now = _stepped(now, bases, solution, turns)
         found = Adjusted(looks, string, path, extra, now, linear, solution, known)
@@ -102,12 +105,12 @@ def adjust_hole(
             if again and not is_bent:  # the first step was not along the sphere
                 whole, legs = learnt_curvature(found)
                 is_bent = bool(np.all(np.abs(np.log(legs / now.leg_vars)) <= LEGS_SETTLED))
-            is_learnt = solution.step < NEAR and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var and is_bent
+            is_learnt = step < NEAR and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var and is_bent
         is_learnt |= again >= ITERATIONS
-        if is_learnt and solution.step < SETTLED:
+        if is_learnt and step < SETTLED:
             break
         if not is_learnt:
-            tried = [*tried, (now.play_var, play)] if solution.step < NEAR else []
+            tried = [*tried, (now.play_var, play)] if step < NEAR else []
             now = replace(now, play_var=faster_play(tried) if tried else play)
         if again and not is_learnt and not is_bent:
             between = swing.part_of_way(np.append(now.leg_vars, now.curvature_var), np.append(legs, whole))
@@ -144,14 +147,16 @@ def solve_equations(
     equations = gather_equations(looks, linear, of_path, known, departure, extra)
     diagonal, tied, coupled, in_common = equations.diagonal, equations.tied, equations.coupled, equations.in_common
     eliminate_path(diagonal, tied, coupled)
-    wide = coupled.reshape(-1, coupled.shape[2])
+    wide, size, own = coupled.reshape(-1, coupled.shape[2]), len(known), coupled[:, :, -1]
+    whole = in_common[:size, :size].copy()
     in_common -= wide.T @ wide
-    size = len(known)
-    cov = np.asarray(np.linalg.inv(in_common[:size, :size]), np.float64)
-    common = cov @ in_common[:size, size]
-    states = (coupled[:, :, size] - coupled[:, :, :size] @ common)[:, :, None].copy()
+    left = InCommon(in_common[:size, :size], in_common[:size, size])
+    states = (own - coupled[:, :, :size] @ left.step)[:, :, None].copy()
     substitute_path(diagonal, tied, states)
-    return LinearSolution(diagonal, tied, coupled[:, :, :size], cov, common, states[:, :, 0])
+    gain = float(np.sum(own * own))
+    return LinearSolution(
+        diagonal, tied, coupled[:, :, :size], left, states[:, :, 0], gain, equations.at_station, whole
+    )
 
 
 def gather_equations(
@@ -176,7 +181,7 @@ def gather_equations(
     diagonal[:, :2, :2] += at_station
     coupled[:, :2] = by_direction
     coupled[:, :, size] += right
-    return Equations(diagonal, tied, coupled, in_common)
+    return Equations(diagonal, tied, coupled, in_common, at_station)
 
 
 def poor_yaws(looks: Looks, count: int) -> Truths:

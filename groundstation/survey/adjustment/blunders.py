@@ -19,6 +19,7 @@ from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.collar import collar_departure
 from groundstation.survey.adjustment.hypotheses import BY_DEPTH, KNOWN_SIZE, WIDTHS, Hypothesis, all_hypotheses
+from groundstation.survey.adjustment.hypothesis_count import count_hypotheses
 from groundstation.survey.adjustment.looks import Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.scores import Score, log_chances, log_tail, score_hypotheses
@@ -281,7 +282,7 @@ def chance_of_one(looks: Looks, run: RunOfStops) -> float:
 
 def log_of_level(looks: Looks, run: RunOfStops) -> float:
     """Logarithm of how many chances an honest hole has: of all hypotheses, and of all stops."""
-    hypotheses = 1 + sum(1 for _ in all_hypotheses(looks, run))  # and the collar
+    hypotheses = 1 + count_hypotheses(looks, run)  # and the collar
     return math.log(hypotheses) + log_of_stops(looks)
 
 
