@@ -6,6 +6,8 @@ what it may.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -41,9 +43,7 @@ class Other:
         """What the link delivers of a frame with these entries and this acknowledgement."""
         self.count += 1
         epoch = self.boot << 24 | self.session << 8 | self.address
-        header = Header(
-            self.address, epoch, self.count, self.link.epoch if ack_epoch is None else ack_epoch, ack, mask
-        )
+        header = Header(self.address, epoch, self.count, self.link.epoch if ack_epoch is None else ack_epoch, ack, mask)
         return [bytes(payload) for payload in self.link.receive(pack_frame(header, entries), at)]
 
 
@@ -136,7 +136,7 @@ def test_what_is_not_acknowledged_is_sent_at_growing_intervals_and_then_every_tw
             other.says((0, b"beat"), at=at)
         if (1, b"kept") in entries_of(link, at):
             sent.append(at)
-    waits = [round(later - earlier, 3) for earlier, later in zip(sent, sent[1:], strict=False)]
+    waits = [round(later - earlier, 3) for earlier, later in pairwise(sent)]
     assert waits[:5] == [0.06, 0.12, 0.24, 0.48, 0.96]
     assert waits[6:] == [2.0] * len(waits[6:])
     assert len(waits[6:]) >= 7

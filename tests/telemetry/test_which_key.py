@@ -154,7 +154,9 @@ def joint_generation(frame: bytes, sender: int, addressee: int) -> int:
     """The one generation whose key fits a frame of a joint."""
     purpose = ("call", 0) if HEAD.unpack_from(frame)[4] == joint_seal.ANYBODY else ("joint", sender)
     (number,) = [
-        n for n in SECRETS if ring(addressee, n).generations[0].seal_key(*purpose).fits(frame[-8:], frame[:-8])  # type: ignore[union-attr]
+        n
+        for n in SECRETS
+        if ring(addressee, n).generations[0].seal_key(*purpose).fits(frame[-8:], frame[:-8])  # type: ignore[union-attr]
     ]
     return number
 
