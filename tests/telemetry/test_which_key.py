@@ -244,7 +244,9 @@ def test_a_block_is_sealed_with_the_newest_keys_of_a_tube_or_with_the_oldest_of_
     assert base.block_key(1) == keys[1]
     assert [base.block_key(1, newest) for newest in (1, 2, 3)] == [keys[1], keys[2], keys[2]]
     assert ring(BASE, 2, 3).block_key(1, 1) == keys_of(SECRETS[2], 1)["block", 1]
-    assert ring(BASE, 1, 2, revoked=(1,)).block_key(1) is None
+    revoked = KeyRing("rig-1", BASE, base.generations, frozenset({1}))  # its keys are still in the file
+    assert [revoked.block_key(1), revoked.block_key(1, 2)] == [None, None]
+    assert revoked.block_key(2) == keys_of(SECRETS[1], 2)["block", 2]
 
 
 @pytest.mark.parametrize("mode", [0o640, 0o604, 0o620, 0o610, 0o601])
