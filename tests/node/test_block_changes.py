@@ -11,6 +11,7 @@ from strict_disk import Left, PowerCutError, StrictDisk
 from node.firmware.block_trial import DIFFER_CYCLES, STILL_CYCLES, Trial, TrialVerdict
 from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.record.sensor_record import new_mount
 from node.process.block_store import BlockStore
 from node.process.block_updater import BlockUpdater
 from node.process.tube_process import TubeProcess
@@ -96,8 +97,9 @@ def test_a_block_must_be_newer_than_the_one_in_use(rested: Callable[[], Node], v
     node.take(*segments(5, 1))
     node.rest(STILL_CYCLES + 1)
     assert node.version == 5
-    status = node.take(*segments(version, 2, 1.1e-3))
-    assert (status.phase is not UploadPhase.REFUSED) == is_taken
+    first, *rest = segments(version, 2, 1.1e-3)
+    assert (node.take(first).phase is not UploadPhase.REFUSED) == is_taken
+    assert (node.take(*rest).phase is not UploadPhase.REFUSED) == is_taken
 
 
 def test_a_newer_upload_ends_the_trial_of_the_one_before(rested: Callable[[], Node]) -> None:
@@ -147,6 +149,24 @@ def test_a_segment_has_a_number_below_that_of_all(rested: Callable[[], Node], be
     part = segments(5, 1)[-1]
     wrong = sealed_segment(replace(part, index=part.count - 1 + beyond), KEY)
     assert (rested().take(wrong).phase is UploadPhase.UNTRUSTED) == bool(beyond)
+
+
+def test_a_node_whose_blocks_are_lost_forgets_what_was_found_under_them(rested: Callable[[], Node]) -> None:
+    node = rested()
+    node.take(*segments(5, 1))
+    node.rest(130)
+    mount = node.process.nodes["mount"]
+    mount["method"], mount["axis"], mount["std"] = 1, (0.02, -0.01, 0.99975), 1e-3
+    assert node.process.state[0]["static_bias"].any()
+    node.process.close()
+    for is_damaged in (False, True):
+        for name in ("parameters-0", "parameters-1"):
+            if is_damaged and name in node.disk.seen:
+                node.disk.seen[name].seen[40] ^= 1
+        again = Node(node.disk.after_cut(Left.ALL))
+        assert again.version == (0 if is_damaged else 5)
+        assert again.process.state[0]["static_bias"].any() != is_damaged
+        assert (again.process.nodes["mount"] == new_mount()).all() == is_damaged
 
 
 REST = ((0.0, 0.0, 0.0), (0.0, 0.3, -9.8), 25.0)

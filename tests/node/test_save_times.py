@@ -214,3 +214,7 @@ def test_surveys_that_are_sent_again_are_saved_with_the_next_frame(tmp_path: Pat
     assert process._resend(5, 6) == (2, 0)
     assert process._saver.due
     assert process._resend(6, 6)[0] == 1
+    for first, last, sent in ((5, 6, 2), (6, 6, 1), (5, 5, 1), (6, 5, None)):
+        reply = process._commands.obey(Command(3, 9, "resend", {"first": first, "last": last}))
+        assert reply.done == (sent is not None)
+        assert reply.values.get("sent") == sent
