@@ -207,6 +207,9 @@ def strip_scales(page: Page) -> tuple[Callable[[float], float], Callable[[float]
     (m0, y0), (m1, y1) = depths[0], depths[-1]
     (c1, x1) = widths[-1]
     assert (m0, m1 > 0.0) == (0.0, True)
+    assert y0 < y1, "the collar is at the top"
+    assert c1 > 0.0
+    assert x1 > 34.0
     return lambda x: c1 * (x - 34.0) / (x1 - 34.0), lambda y: m1 * (y - y0) / (y1 - y0)
 
 

@@ -16,9 +16,21 @@ from telemetry.application.place import StringPlace
 from telemetry.application.seals import Keys
 from telemetry.frozen import replace
 from telemetry.media.can_exchange import BUDGET_BURST, BUDGETS, Budget
+from telemetry.media.can_profile import NativePart
 from telemetry.media.isotp import Sender
 from telemetry.media.port import Priority
-from telemetry.messages import BASE, MAX_TUBE, BlockStatus, Hello, NodeMode, Side, Stand, TimeRequest, UploadPhase
+from telemetry.messages import (
+    BASE,
+    MAX_TUBE,
+    Aiding,
+    BlockStatus,
+    Hello,
+    NodeMode,
+    Side,
+    Stand,
+    TimeRequest,
+    UploadPhase,
+)
 from telemetry.presentation.can_native import HEADER_EVERY, NativeProfile, native_parts
 from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.transport.hop import Header, pack_frame, parse_frame
@@ -99,6 +111,27 @@ def test_signals_of_a_sender_that_started_again_are_numbered_anew(starts: int) -
         parsed = parse_frame(bytes(joined))
         assert parsed is not None
         assert (parsed[0].epoch, parsed[0].number) == (epoch, before + 1)
+
+
+@pytest.mark.parametrize("kept", [1, 2])
+def test_what_is_left_of_a_message_is_not_filled_up_by_the_next(kept: int) -> None:
+    """The first part of one is lost, and then all but the first of the next: no frame is made of the two."""
+    profile = NativeProfile()
+    profile.observe(pack_frame(Header(2, 1 << 24 | 2, 1, 0, 0, 0), []))
+    one, other = (
+        native_parts(encode_message(Aiding(yaw, 2e-6, 3e-7, -0.3, 1.24, 1234.5, 5, 3)), count, fd=False) or []
+        for yaw, count in ((1.0, 1), (2.0, 2))
+    )
+    assert len(one) == len(other) > kept
+
+    def join(part: NativePart) -> object:
+        return profile.join(2, part.identifier >> 21 & 0x1F, part.identifier & 0x1F, part.data)
+
+    for _ in range(2):
+        assert [join(part) for part in (*one[kept:], *other[:kept])] == [None] * len(one)
+        found = [join(part) for part in other[kept:]]
+        assert found[:-1] == [None] * (len(found) - 1)
+        assert found[-1] is not None
 
 
 def test_the_header_goes_again_exactly_when_it_is_due() -> None:
