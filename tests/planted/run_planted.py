@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from choice_of_tests import choose_tests
-from defect_lists import KINDS, ROOT, Defect, DefectError, read_defects, sample_of
+from defect_lists import KINDS, LISTS, ROOT, Defect, DefectError, read_defects, sample_of
 
 USUAL = "process or install or statistical"  # what is left out
 PASSES = (f"not (slow or {USUAL})", f"slow and not ({USUAL})")  # the second only where the first notices nothing
@@ -185,7 +185,7 @@ def summary_of(outcomes: Iterable[Outcome]) -> list[str]:
 
 def chosen_of(arguments: argparse.Namespace) -> list[Defect]:
     """Return the defects that were asked for; every one of the lists must be there to plant."""
-    defects = read_defects()
+    defects = read_defects(arguments.lists)
     for defect in defects:
         defect.planted_text(ROOT)
     if arguments.only:
@@ -201,6 +201,7 @@ def arguments_of(words: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="at a time")
     parser.add_argument("--fast", action="store_true", help="without the tests that are marked slow")
     parser.add_argument("--at-least", type=float, default=95.0, metavar="PERCENT", help="that are to be noticed")
+    parser.add_argument("--lists", type=Path, default=LISTS, help="folder of lists, instead of the project's own")
     parser.add_argument("--out", type=Path, help="JSON file of the outcomes")
     return parser.parse_args(words)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -55,3 +57,39 @@ def test_a_file_without_tests_is_named() -> None:
         choose_tests(Defect("a name", "one", 1, "groundstation/gateway/page/static/js/plan.js", "a", "b"), ROOT)
     with pytest.raises(DefectError, match=r"got nowhere\.py"):
         choose_tests(Defect("a name", "one", 1, "telemetry/keys.py", "a", "b", ("nowhere.py",)), ROOT)
+
+
+HARMLESS = """
+[[defect]]
+name = "a word of a comment"
+kind = 8
+file = "telemetry/transport/nearest.py"
+old = "# s of listening before the first is chosen"
+new = "# s of waiting before the first is chosen"
+tests = ["telemetry/test_nearest.py"]
+
+[[defect]]
+name = "the farthest is chosen"
+kind = 7
+file = "telemetry/transport/nearest.py"
+old = "sender == min(self._heard, key=self._distance)"
+new = "sender == max(self._heard, key=self._distance)"
+tests = ["telemetry/test_nearest.py"]
+"""
+
+
+@pytest.mark.slow
+def test_what_is_noticed_and_what_survives_is_told_by_package_and_kind(tmp_path: Path) -> None:
+    (tmp_path / "some.toml").write_text(HARMLESS)
+    command = [sys.executable, str(ROOT / "tests/planted/run_planted.py"), "--fast", "--jobs", "1"]
+    done = subprocess.run([*command, "--lists", str(tmp_path)], capture_output=True, text=True, check=False)
+    told = done.stdout.splitlines()
+    assert done.returncode == 1, done.stderr
+    assert "   1 of   2   50 %  package some" in told
+    assert "   1 of   1  100 %  kind 7 (keeping the wrong one)" in told
+    assert told[-1] == "survives: a word of a comment (telemetry/transport/nearest.py)"
+    assert any("the farthest is chosen: found by FAILED tests/telemetry/test_nearest.py" in line for line in told)
+    (tmp_path / "some.toml").write_text(HARMLESS.replace("min(self._heard", "least(self._heard"))
+    gone = subprocess.run([*command, "--lists", str(tmp_path)], capture_output=True, text=True, check=False)
+    assert gone.returncode == 2
+    assert "the farthest is chosen: expected its old text once in telemetry/transport/nearest.py" in gone.stderr
