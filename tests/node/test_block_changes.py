@@ -200,7 +200,6 @@ def test_only_readings_in_a_row_decide_about_a_block(before: str, last: str, dec
     assert found == [TrialVerdict.WAIT] * len(before) + [decided]
 
 
-@pytest.mark.slow
 def test_a_cut_at_any_call_of_a_change_leaves_no_bias_of_another_block(rested: Callable[[], Node]) -> None:
     """The old block with the bias that was learnt or learnt anew, or the new one with a bias learnt anew."""
 

@@ -31,7 +31,8 @@ class Defect:
     """One defect: ``old`` stands exactly once in ``file`` and is replaced by ``new``.
 
     ``package`` is the list that it stands in; ``tests`` are files below ``tests/``, empty where they are chosen by what
-    they import.
+    they import. One that is ``switched`` stands in a kernel: its texts are expressions of one type, between which a
+    number decides while the kernel runs, so that all of them are compiled once.
     """
 
     name: str
@@ -41,13 +42,17 @@ class Defect:
     old: str
     new: str
     tests: tuple[str, ...] = ()
+    switched: bool = False
 
     def planted_text(self, root: Path) -> str:
         """Text of its file below ``root`` with the defect in it."""
-        text = (root / self.file).read_text(encoding="utf-8")
+        return self.plant((root / self.file).read_text(encoding="utf-8"), self.new)
+
+    def plant(self, text: str, new: str) -> str:
+        """Text with ``new`` in the place of the old one."""
         if (found := text.count(self.old)) != 1:
             raise DefectError(f"{self.name}: expected its old text once in {self.file}, found it {found} times")
-        return text.replace(self.old, self.new)
+        return text.replace(self.old, new)
 
 
 def read_defects(lists: Path = LISTS) -> list[Defect]:

@@ -26,6 +26,7 @@ from typing import NamedTuple
 
 from choice_of_tests import choose_tests
 from defect_lists import KINDS, LISTS, ROOT, Defect, DefectError, read_defects, sample_of
+from kernel_switch import VARIABLE, plant_switched
 
 USUAL = "process or install or statistical"  # what is left out
 PASSES = (f"not (slow or {USUAL})", f"slow and not ({USUAL})")  # the second only where the first notices nothing
@@ -48,8 +49,8 @@ class Outcome(NamedTuple):
 class Bench:
     """A copy of the sources in which one defect after the other is planted."""
 
-    def __init__(self, folder: Path, passes: Sequence[str] = PASSES) -> None:
-        self.root, self.passes = folder, passes
+    def __init__(self, folder: Path, passes: Sequence[str] = PASSES, switched: Sequence[Defect] = ()) -> None:
+        self.root, self.passes, self._switched = folder, passes, [defect.name for defect in switched]
         listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
         names = subprocess.run(listed, cwd=ROOT, check=True, capture_output=True).stdout.split(b"\0")
         for name in sorted(filter(None, map(os.fsdecode, names))):
@@ -57,10 +58,17 @@ class Bench:
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(ROOT / name, folder / name)
         self._written_at = time.time()
+        if switched:
+            plant_switched(folder, switched)
 
     @contextlib.contextmanager
     def planted(self, defect: Defect) -> Iterator[None]:
-        """Hold a defect in the sources."""
+        """Hold a defect in the sources, or switch it on."""
+        if defect.switched:
+            os.environ[VARIABLE] = str(1 + self._switched.index(defect.name))
+            yield
+            os.environ[VARIABLE] = "0"
+            return
         file = self.root / defect.file
         sound = file.read_text(encoding="utf-8")
         self._write(file, defect.planted_text(self.root))
@@ -114,7 +122,7 @@ def become_tests(root: Path, tests: Sequence[str], chosen: str, told: Path) -> N
         os.environ |= {"PYTHONPATH": str(root), "BORECHAIN_CORES": "1"}
         own = (Path(__file__).parent, ROOT)
         sys.path[:] = [str(root), *(place for place in sys.path if Path(place) not in own)]
-        for name in ("defect_lists", "choice_of_tests"):
+        for name in ("defect_lists", "choice_of_tests", "kernel_switch"):
             del sys.modules[name]  # the copy has its own
         command = ["-x", "-q", "--no-header", "--tb=no", "-p", "no:cacheprovider", "-p", "no:xdist"]
         command += ["-W", "ignore::pytest.PytestAssertRewriteWarning", "-m", chosen]
@@ -126,38 +134,60 @@ def become_tests(root: Path, tests: Sequence[str], chosen: str, told: Path) -> N
         os._exit(code)
 
 
-def judge_part(defects: Sequence[Defect], bench: Bench, told: int) -> None:
+def judge_part(defects: Sequence[Defect], folder: Path, passes: Sequence[str], told: int) -> None:
     """Judge defects one after the other in a copy of their own; a line of JSON for each to ``told``."""
+    switched = [defect for defect in defects if defect.switched]
+    plain = Bench(folder / "plain", passes)
+    kernels = Bench(folder / "kernels", passes, switched) if switched else plain
+    if switched:
+        refuse_failing(switched, kernels)
     for defect in defects:
+        bench = kernels if defect.switched else plain
         begun = time.monotonic()
         is_found, by = bench.judge(defect)
         os.write(told, json.dumps([defect.name, is_found, by, time.monotonic() - begun]).encode() + b"\n")
 
 
+def tell_part(part: Sequence[Defect], folder: Path, passes: Sequence[str], told: int) -> None:
+    """Judge a part in this process, a fork, and end it."""
+    code = 0
+    try:
+        judge_part(part, folder, passes, told)
+    except DefectError as error:
+        print(error, file=sys.stderr)
+        code = 2
+    finally:
+        os._exit(code)
+
+
 def judge_all(defects: Sequence[Defect], jobs: int, passes: Sequence[str] = PASSES) -> Iterator[Outcome]:
     """Judge all defects, ``jobs`` at a time."""
     by_name = {defect.name: defect for defect in defects}
+    # all kernels go into one copy, that they are compiled once
+    plain, kernels = [d for d in defects if not d.switched], [d for d in defects if d.switched]
+    parts = [plain[job::jobs] + (kernels if job == 0 else []) for job in range(jobs)]
     with tempfile.TemporaryDirectory(prefix="planted-") as folder:
         refuse_failing(defects, Bench(Path(folder) / "sound", passes))
         reader, writer = os.pipe()
         children = []
-        for job in range(jobs):
+        for job, part in enumerate(parts):
             children.append(os.fork())
             if not children[-1]:
                 os.close(reader)
-                judge_part(defects[job::jobs], Bench(Path(folder) / str(job), passes), writer)
-                os._exit(0)
+                tell_part(part, Path(folder) / str(job), passes, writer)
         os.close(writer)
         try:
             with os.fdopen(reader, encoding="utf-8") as lines:
                 for line in lines:
                     name, is_found, by, seconds = json.loads(line)
-                    yield Outcome(by_name[name], is_found, by, seconds)
+                    yield Outcome(by_name.pop(name), is_found, by, seconds)
         finally:
             for child in children:
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(child, signal.SIGTERM)
                 os.waitpid(child, 0)
+    if by_name:
+        raise DefectError(f"{len(by_name)} of {len(defects)} defects could not be judged, the first: {min(by_name)}")
 
 
 def refuse_failing(defects: Iterable[Defect], bench: Bench) -> None:
