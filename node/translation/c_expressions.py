@@ -1,4 +1,4 @@
-"""Expressions of a kernel in C, each with the meaning that numba gives it for integers."""
+"""CExpressions of a kernel in C, each with the meaning that numba gives it for integers."""
 
 from __future__ import annotations
 
@@ -10,18 +10,6 @@ from typing import Any, Final, Protocol
 import numpy as np
 
 from node.kernels.arithmetic.quantity import Constant
-from node.translation.c_kinds import (
-    INTEGER,
-    TRUTH,
-    ArrayOf,
-    FunctionOf,
-    Kind,
-    Plain,
-    RecordOf,
-    Several,
-    is_number,
-    kind_of_dtype,
-)
 from node.translation.c_value import (
     ATOM,
     CHOSEN,
@@ -31,14 +19,26 @@ from node.translation.c_value import (
     PRODUCT,
     SUM,
     UNARY,
-    Value,
+    CValue,
     c_word,
     element_of,
     number_value,
     several_values,
     truth_value,
 )
-from node.translation.kernel_source import UntranslatableKernel, python_function
+from node.translation.kernel_source import UntranslatableKernelError, python_function
+from node.translation.kinds_of_values import (
+    INTEGER,
+    TRUTH,
+    ArrayOf,
+    FunctionOf,
+    Kind,
+    Plain,
+    RecordOf,
+    Several,
+    is_numeric,
+    kind_of_dtype,
+)
 
 SIGNS: Final[dict[type[ast.operator], tuple[str, int]]] = {
     ast.Add: ("+", SUM),
@@ -72,7 +72,7 @@ COMPARISONS: Final[dict[type[ast.cmpop], str]] = {
 HELPERS: Final = {"min": "least", "max": "most"}
 
 
-class Program(Protocol):
+class CContext(Protocol):
     """What an expression needs of the file that it goes into."""
 
     def constant(self, name: str, number: int) -> str:
@@ -87,12 +87,12 @@ class Program(Protocol):
         """Name in C of the struct of a record, or of several values."""
         ...
 
-    def call(self, function: Any, given: list[Value], place: str) -> Value:
+    def call(self, function: Any, given: list[CValue], place: str) -> CValue:
         """Call of a kernel with these arguments."""
         ...
 
 
-class Expressions:
+class CExpressions:
     """Translates the expressions of one function.
 
     Parameters
@@ -102,64 +102,64 @@ class Expressions:
     place : where the function stands, for errors
     """
 
-    def __init__(self, program: Program, names: dict[str, Any], place: str) -> None:
+    def __init__(self, program: CContext, names: dict[str, Any], place: str) -> None:
         self._program, self._names, self._place = program, names, place
-        self.variables: dict[str, Value] = {}
+        self.variables: dict[str, CValue] = {}
 
-    def refuse(self, node: ast.AST, why: str) -> UntranslatableKernel:
+    def refuse(self, node: ast.AST, why: str) -> UntranslatableKernelError:
         """The error of a piece of source that is not translated."""
         path, _, _ = self._place.rpartition(":")
         text = ast.unparse(node)[:80]
-        return UntranslatableKernel(f"{path}:{getattr(node, 'lineno', '?')}: {why}: {text}")
+        return UntranslatableKernelError(f"{path}:{getattr(node, 'lineno', '?')}: {why}: {text}")
 
-    def value(self, node: ast.expr) -> Value:
+    def value(self, node: ast.expr) -> CValue:
         """C of an expression."""
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
         if method is None:
             raise self.refuse(node, f"expected what C has too, got {type(node).__name__}")
-        found: Value = method(node)
+        found: CValue = method(node)
         return found
 
-    def truth(self, node: ast.expr) -> Value:
+    def truth(self, node: ast.expr) -> CValue:
         """C of an expression that is asked for its truth."""
         found = self.value(node)
-        if not is_number(found.kind):
+        if not is_numeric(found.kind):
             raise self.refuse(node, "expected a number or a truth")
-        return found if found.kind == TRUTH else Value(f"{found.within(SUM)} != 0", TRUTH, COMPARED)
+        return found if found.kind == TRUTH else CValue(f"{found.within(SUM)} != 0", TRUTH, COMPARED)
 
-    def _constant(self, node: ast.Constant) -> Value:
+    def _constant(self, node: ast.Constant) -> CValue:
         if isinstance(node.value, bool):
             return truth_value(node.value)
         if isinstance(node.value, int):
             return number_value(node.value)
         raise self.refuse(node, "expected a whole number, for chips count in integers")
 
-    def _name(self, node: ast.Name) -> Value:
+    def _name(self, node: ast.Name) -> CValue:
         if node.id in self.variables:
             return self.variables[node.id]
         if node.id not in self._names and not hasattr(builtins, node.id):
             raise self.refuse(node, "expected a name that is known")
         return self._global(node, node.id, self._names.get(node.id, getattr(builtins, node.id, None)))
 
-    def _global(self, node: ast.AST, name: str, found: Any) -> Value:
+    def _global(self, node: ast.AST, name: str, found: Any) -> CValue:
         if isinstance(found, bool):
             return truth_value(found)
         if isinstance(found, Constant | int | np.integer):
             number = found.fixed if isinstance(found, Constant) else int(found)
-            return Value(self._program.constant(name, number), INTEGER, known=number)
+            return CValue(self._program.constant(name, number), INTEGER, known=number)
         if isinstance(found, np.ndarray) and found.dtype.kind in "iu" and found.ndim == 1:
             return self._table(name, tuple(map(int, found)))
         if isinstance(found, tuple) and all(isinstance(number, int) for number in found):
             return self._table(name, tuple(map(int, found)))
         if callable(found):
-            return Value(name, FunctionOf(python_function(found)))
+            return CValue(name, FunctionOf(python_function(found)))
         raise self.refuse(node, f"expected integers, a table of them or a kernel, got {type(found).__name__}")
 
-    def _table(self, name: str, numbers: tuple[int, ...]) -> Value:
+    def _table(self, name: str, numbers: tuple[int, ...]) -> CValue:
         parts = tuple(number_value(number) for number in numbers)
-        return Value(self._program.table(name, numbers), ArrayOf(INTEGER, (len(numbers),)), parts=parts)
+        return CValue(self._program.table(name, numbers), ArrayOf(INTEGER, (len(numbers),)), parts=parts)
 
-    def _attribute(self, node: ast.Attribute) -> Value:
+    def _attribute(self, node: ast.Attribute) -> CValue:
         if isinstance(node.value, ast.Name) and node.value.id not in self.variables:
             whole = self._names.get(node.value.id)
             if whole is not None and hasattr(whole, node.attr):
@@ -172,9 +172,9 @@ class Expressions:
         kind = kind_of_dtype(fields[node.attr][0])
         joined = "." if record.is_place else "->"
         code = f"{record.within(ATOM)}{joined}{c_word(node.attr)}"
-        return Value(code, kind, is_place=isinstance(kind, RecordOf))
+        return CValue(code, kind, is_place=isinstance(kind, RecordOf))
 
-    def _subscript(self, node: ast.Subscript) -> Value:
+    def _subscript(self, node: ast.Subscript) -> CValue:
         if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":
             return self._length(node)
         found = self.value(node.value)
@@ -183,7 +183,7 @@ class Expressions:
             found = self._part(node, found, index, last=place == len(indices) - 1)
         return found
 
-    def _length(self, node: ast.Subscript) -> Value:
+    def _length(self, node: ast.Subscript) -> CValue:
         assert isinstance(node.value, ast.Attribute)
         array, axis = self.value(node.value.value), self.value(node.slice).known
         if not isinstance(array.kind, ArrayOf) or axis is None:
@@ -193,9 +193,9 @@ class Expressions:
             return number_value(length)
         if not array.length:
             raise self.refuse(node, "expected an array whose length is handed on")
-        return Value(array.length, INTEGER)
+        return CValue(array.length, INTEGER)
 
-    def _part(self, node: ast.Subscript, found: Value, index: ast.expr, *, last: bool) -> Value:
+    def _part(self, node: ast.Subscript, found: CValue, index: ast.expr, *, last: bool) -> CValue:
         if isinstance(index, ast.Slice):
             if not last:
                 raise self.refuse(node, "expected a slice of the last index, for others skip memory")
@@ -204,14 +204,14 @@ class Expressions:
         if isinstance(found.kind, Several) and at.known is not None:
             return self.part_of(found, at.known)
         if isinstance(found.kind, Several) and found.parts is None and found.kind.is_flat:
-            return Value(f"{found.within(ATOM)}{found.kind.part(at.code)}", INTEGER)
-        if not isinstance(found.kind, ArrayOf) or not is_number(at.kind):
+            return CValue(f"{found.within(ATOM)}{found.kind.part(at.code)}", INTEGER)
+        if not isinstance(found.kind, ArrayOf) or not is_numeric(at.kind):
             raise self.refuse(node, "expected an element of an array")
         if at.known is not None and at.known < 0:
             raise self.refuse(node, "expected a place that is counted from the first")
         return element_of(found, at.code)
 
-    def _slice_of(self, node: ast.Subscript, found: Value, index: ast.Slice) -> Value:
+    def _slice_of(self, node: ast.Subscript, found: CValue, index: ast.Slice) -> CValue:
         kind = found.kind
         if not isinstance(kind, ArrayOf) or index.step is not None:
             raise self.refuse(node, "expected a slice of an array, without a step")
@@ -222,30 +222,30 @@ class Expressions:
         code = found.code if lower.known == 0 else f"&{found.within(ATOM)}[{lower.code}]"
         level = ATOM if lower.known == 0 else UNARY
         if upper.known is not None and lower.known is not None:
-            return Value(code, ArrayOf(kind.element, (upper.known - lower.known, *kind.shape[1:])), level)
+            return CValue(code, ArrayOf(kind.element, (upper.known - lower.known, *kind.shape[1:])), level)
         length = upper.code if lower.known == 0 else f"{upper.within(SUM)} - {lower.within(PRODUCT)}"
-        return Value(code, ArrayOf(kind.element, (None, *kind.shape[1:])), level, length=length)
+        return CValue(code, ArrayOf(kind.element, (None, *kind.shape[1:])), level, length=length)
 
-    def _end_of(self, node: ast.Subscript, found: Value) -> Value:
+    def _end_of(self, node: ast.Subscript, found: CValue) -> CValue:
         length = found.kind.shape[0] if isinstance(found.kind, ArrayOf) else None
         if length is None:
             raise self.refuse(node, "expected a slice with an end")
         return number_value(length)
 
-    def part_of(self, several: Value, at: int) -> Value:
+    def part_of(self, several: CValue, at: int) -> CValue:
         """One of several values."""
         if several.parts is not None:
             return several.parts[at]
         assert isinstance(several.kind, Several)
-        return Value(f"{several.within(ATOM)}{several.kind.part(at)}", several.kind.kinds[at])
+        return CValue(f"{several.within(ATOM)}{several.kind.part(at)}", several.kind.kinds[at])
 
-    def parts_of(self, several: Value) -> list[Value]:
+    def parts_of(self, several: CValue) -> list[CValue]:
         """All of several values."""
         assert isinstance(several.kind, Several)
         return [self.part_of(several, at) for at in range(len(several.kind.kinds))]
 
-    def _tuple(self, node: ast.Tuple) -> Value:
-        parts: list[Value] = []
+    def _tuple(self, node: ast.Tuple) -> CValue:
+        parts: list[CValue] = []
         for element in node.elts:
             if isinstance(element, ast.Starred):
                 parts.extend(self.parts_of(self.value(element.value)))
@@ -253,9 +253,9 @@ class Expressions:
                 parts.append(self.value(element))
         return several_values(tuple(parts))
 
-    def _binop(self, node: ast.BinOp) -> Value:
+    def _binop(self, node: ast.BinOp) -> CValue:
         left, right, operator = self.value(node.left), self.value(node.right), type(node.op)
-        if not (is_number(left.kind) and is_number(right.kind)) or operator not in FOLDED:
+        if not (is_numeric(left.kind) and is_numeric(right.kind)) or operator not in FOLDED:
             raise self.refuse(node, "expected integers and an operator of theirs")
         self._refuse_unsigned(node, left.kind, right.kind)
         if left.known is not None and right.known is not None:
@@ -270,59 +270,59 @@ class Expressions:
         if unsigned and not isinstance(node.op, ast.BitAnd | ast.BitOr | ast.BitXor):
             raise self.refuse(node, "expected int() around one of two unsigned numbers")
 
-    def _folded(self, left: Value, right: Value, operator: type[ast.operator]) -> Value:
+    def _folded(self, left: CValue, right: CValue, operator: type[ast.operator]) -> CValue:
         number = FOLDED[operator](left.known, right.known)
         small = all(abs(one) < INT32 for one in (number, left.known, right.known))
         if operator not in (ast.Add, ast.Sub, ast.Mult) or not small:
             return number_value(number)
         found = self._signed(left, right, operator)
-        return Value(found.code, INTEGER, found.level, number)
+        return CValue(found.code, INTEGER, found.level, number)
 
-    def _signed(self, left: Value, right: Value, operator: type[ast.operator]) -> Value:
+    def _signed(self, left: CValue, right: CValue, operator: type[ast.operator]) -> CValue:
         sign, level = SIGNS[operator]
         if level == ATOM:
             kind = TRUTH if left.kind == right.kind == TRUTH else INTEGER
-            return Value(f"{_wide(left, ATOM)} {sign} {_wide(right, ATOM)}", kind, COMPARED)
+            return CValue(f"{_wide(left, ATOM)} {sign} {_wide(right, ATOM)}", kind, COMPARED)
         tighter = level if operator is not ast.Sub else PRODUCT
-        return Value(f"{_wide(left, level)} {sign} {_wide(right, tighter)}", INTEGER, level)
+        return CValue(f"{_wide(left, level)} {sign} {_wide(right, tighter)}", INTEGER, level)
 
-    def _called(self, node: ast.BinOp, left: Value, right: Value, operator: type[ast.operator]) -> Value:
+    def _called(self, node: ast.BinOp, left: CValue, right: CValue, operator: type[ast.operator]) -> CValue:
         if operator is ast.LShift:
-            return Value(f"shift_left({left.code}, {right.code})", INTEGER)
+            return CValue(f"shift_left({left.code}, {right.code})", INTEGER)
         if operator is ast.RShift:
-            return Value(f"shift_right({left.code}, {right.code})", INTEGER)
+            return CValue(f"shift_right({left.code}, {right.code})", INTEGER)
         if operator is ast.Pow:
             raise self.refuse(node, "expected a power that is known")
         divisor = right.known
         if divisor is not None and divisor > 0 and divisor & (divisor - 1) == 0:
             if operator is ast.Mod:
-                return Value(f"{_wide(left, ATOM)} & ({right.code} - 1)", INTEGER, COMPARED)
-            return Value(f"shift_right({left.code}, {divisor.bit_length() - 1})", INTEGER)
+                return CValue(f"{_wide(left, ATOM)} & ({right.code} - 1)", INTEGER, COMPARED)
+            return CValue(f"shift_right({left.code}, {divisor.bit_length() - 1})", INTEGER)
         name = "floor_divide" if operator is ast.FloorDiv else "floor_modulo"
-        return Value(f"{name}({left.code}, {right.code})", INTEGER)
+        return CValue(f"{name}({left.code}, {right.code})", INTEGER)
 
-    def _unaryop(self, node: ast.UnaryOp) -> Value:
+    def _unaryop(self, node: ast.UnaryOp) -> CValue:
         if isinstance(node.op, ast.Not):
             found = self.truth(node.operand)
-            return Value(f"!{found.within(ATOM)}", TRUTH, UNARY)
+            return CValue(f"!{found.within(ATOM)}", TRUTH, UNARY)
         found = self.value(node.operand)
-        if not is_number(found.kind):
+        if not is_numeric(found.kind):
             raise self.refuse(node, "expected an integer")
         if found.known is not None and isinstance(node.op, ast.USub) and found.code.lstrip("-").isdigit():
             return number_value(-found.known)
         sign = {ast.USub: "-", ast.Invert: "~", ast.UAdd: "+"}[type(node.op)]
         known = None if found.known is None else -found.known if sign == "-" else ~found.known
-        return Value(f"{sign}{_wide(found, ATOM)}", INTEGER, UNARY, known)
+        return CValue(f"{sign}{_wide(found, ATOM)}", INTEGER, UNARY, known)
 
-    def _boolop(self, node: ast.BoolOp) -> Value:
+    def _boolop(self, node: ast.BoolOp) -> CValue:
         sign = " && " if isinstance(node.op, ast.And) else " || "
-        return Value(sign.join(self.truth(one).within(COMPARED) for one in node.values), TRUTH, LOGICAL)
+        return CValue(sign.join(self.truth(one).within(COMPARED) for one in node.values), TRUTH, LOGICAL)
 
-    def _compare(self, node: ast.Compare) -> Value:
+    def _compare(self, node: ast.Compare) -> CValue:
         values = [self.value(one) for one in (node.left, *node.comparators)]
         if isinstance(node.ops[0], ast.In | ast.NotIn):
             return self._among(node, values)
-        if any(not is_number(one.kind) for one in values):
+        if any(not is_numeric(one.kind) for one in values):
             raise self.refuse(node, "expected numbers to compare")
         signs = [COMPARISONS[type(operator)] for operator in node.ops]
         if len(signs) == 2 and "(" in values[1].code:
@@ -331,36 +331,36 @@ class Expressions:
             f"{one.within(SUM)} {sign} {other.within(SUM)}"
             for one, sign, other in zip(values, signs, values[1:], strict=False)
         ]
-        return Value(" && ".join(pairs), TRUTH, COMPARED if len(pairs) == 1 else LOGICAL)
+        return CValue(" && ".join(pairs), TRUTH, COMPARED if len(pairs) == 1 else LOGICAL)
 
-    def _between(self, node: ast.Compare, values: list[Value], signs: list[str]) -> Value:
+    def _between(self, node: ast.Compare, values: list[CValue], signs: list[str]) -> CValue:
         """A number that takes a call is computed once."""
         if signs[0] not in ("<", "<=") or signs[1] not in ("<", "<="):
             raise self.refuse(node, "expected a number between two")
         ends = {"<": "beyond", "<=": "from"}[signs[0]], {"<": "below", "<=": "upto"}[signs[1]]
         inside = ", ".join(one.code for one in values)
-        return Value(f"is_{ends[0]}_{ends[1]}({inside})", TRUTH)
+        return CValue(f"is_{ends[0]}_{ends[1]}({inside})", TRUTH)
 
-    def _among(self, node: ast.Compare, values: list[Value]) -> Value:
+    def _among(self, node: ast.Compare, values: list[CValue]) -> CValue:
         one, several = values
-        if several.parts is None or not is_number(one.kind):
+        if several.parts is None or not is_numeric(one.kind):
             raise self.refuse(node, "expected a number among several that stand in the source")
         joined = " || ".join(f"{one.within(SUM)} == {part.within(SUM)}" for part in several.parts)
         return (
-            Value(joined, TRUTH, LOGICAL) if isinstance(node.ops[0], ast.In) else Value(f"!({joined})", TRUTH, UNARY)
+            CValue(joined, TRUTH, LOGICAL) if isinstance(node.ops[0], ast.In) else CValue(f"!({joined})", TRUTH, UNARY)
         )
 
-    def _ifexp(self, node: ast.IfExp) -> Value:
+    def _ifexp(self, node: ast.IfExp) -> CValue:
         asked, one, other = self.truth(node.test), self.value(node.body), self.value(node.orelse)
         if isinstance(one.kind, Several) and one.kind == other.kind:
             kind: Kind = one.kind
-        elif is_number(one.kind) and is_number(other.kind):
+        elif is_numeric(one.kind) and is_numeric(other.kind):
             kind = one.kind if one.kind == other.kind == TRUTH else INTEGER
         else:
             raise self.refuse(node, "expected two of one kind")
-        return Value(f"{asked.within(COMPARED)} ? {one.within(LOGICAL)} : {other.within(CHOSEN)}", kind, CHOSEN)
+        return CValue(f"{asked.within(COMPARED)} ? {one.within(LOGICAL)} : {other.within(CHOSEN)}", kind, CHOSEN)
 
-    def _call(self, node: ast.Call) -> Value:
+    def _call(self, node: ast.Call) -> CValue:
         if node.keywords:
             raise self.refuse(node, "expected arguments by their place")
         name = node.func.id if isinstance(node.func, ast.Name) else ""
@@ -371,8 +371,8 @@ class Expressions:
             raise self.refuse(node, "expected a kernel to call")
         return self._program.call(function.kind.function, self._arguments(node), self._place)
 
-    def _arguments(self, node: ast.Call) -> list[Value]:
-        given: list[Value] = []
+    def _arguments(self, node: ast.Call) -> list[CValue]:
+        given: list[CValue] = []
         for argument in node.args:
             if isinstance(argument, ast.Starred):
                 given.extend(self.parts_of(self.value(argument.value)))
@@ -380,25 +380,25 @@ class Expressions:
                 given.append(self.value(argument))
         return given
 
-    def _builtin(self, node: ast.Call, name: str) -> Value:
+    def _builtin(self, node: ast.Call, name: str) -> CValue:
         given = self._arguments(node)
-        if not given or any(not is_number(one.kind) for one in given):
+        if not given or any(not is_numeric(one.kind) for one in given):
             raise self.refuse(node, "expected integers")
         if name == "int":
-            return Value(given[0].code, INTEGER, given[0].level, given[0].known)
+            return CValue(given[0].code, INTEGER, given[0].level, given[0].known)
         if name == "bool":
             return self.truth(node.args[0])
         if name == "abs":
-            return Value(f"magnitude({given[0].code})", INTEGER)
+            return CValue(f"magnitude({given[0].code})", INTEGER)
         if name not in HELPERS or len(given) < 2:
             raise self.refuse(node, "expected int, bool, abs, min or max")
         code = given[0].code
         for one in given[1:]:
             code = f"{HELPERS[name]}({code}, {one.code})"
-        return Value(code, INTEGER)
+        return CValue(code, INTEGER)
 
 
-def _wide(value: Value, level: int) -> str:
+def _wide(value: CValue, level: int) -> str:
     """An operand in 64 bits: a product of narrow ones would be made in 32."""
     if value.kind == INTEGER or value.known is not None:
         return value.within(level)

@@ -1,4 +1,4 @@
-"""The two files of the integer step in C: a header for whoever calls it, and the code."""
+"""The two files of the integer step in C: a header for its caller, and the code."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from node.kernels.record.integer_node import FIXED_NODE, FIXED_PARAMETERS, FIXED
 from node.kernels.record.node_record import AIDING, MOMENT, NODE_LAYOUT, READING
 from node.kernels.record.sensor_record import MAX_IMUS
 from node.kernels.step.fixed_step import integer_aiding, integer_step
-from node.translation.c_kinds import INTEGER, ArrayOf, Kind, RecordOf, declaration
 from node.translation.c_helpers import helpers_text
+from node.translation.c_lines import break_line
 from node.translation.c_program import CProgram
-from node.translation.c_records import PREFIX, Records
+from node.translation.c_structs import PREFIX, CStructs
 from node.translation.c_value import c_word
 from node.translation.kernel_source import integer_source
+from node.translation.kinds_of_values import INTEGER, ArrayOf, Kind, RecordOf, declare_variable
 
 HEADER, CODE = "borechain_step.h", "borechain_step.c"
 NODES: Final = ArrayOf(RecordOf(FIXED_NODE), (1,))
@@ -39,6 +40,8 @@ CHECKS: Final = """\
 #define LIES_AT(record, field, place) \\
     typedef char record##_##field##_lies[(offsetof(struct record, field) == (place)) ? 1 : -1]
 """
+
+
 class CFiles(NamedTuple):
     """The integer step in C.
 
@@ -60,10 +63,10 @@ def write_c_files() -> CFiles:
 
     Raises
     ------
-    UntranslatableKernel
+    UntranslatableKernelError
         When a kernel says what is not translated.
     """
-    records = Records()
+    records = CStructs()
     program = CProgram(records)
     prototypes = [_entry(program, name) for name in ENTRIES]
     functions, constants, structs = "\n".join(program.texts), program.constants_text(), records.text()
@@ -78,10 +81,10 @@ def _entry(program: CProgram, name: str) -> str:
     source = integer_source(function)
     made = program.write(source, kinds, f"{PREFIX}{name}", static="")
     arguments = ", ".join(
-        declaration(kind, c_word(argument), program.struct_name)
+        declare_variable(kind, c_word(argument), program.struct_name)
         for argument, kind in zip(source.arguments, kinds, strict=True)
     )
-    return f"{declaration(made.returned, made.name, program.struct_name)}({arguments});"
+    return break_line(f"{declare_variable(made.returned, made.name, program.struct_name)}({arguments});")
 
 
 def _header(structs: str, prototypes: list[str], digest: str) -> str:
@@ -90,7 +93,8 @@ def _header(structs: str, prototypes: list[str], digest: str) -> str:
 /* One node of a drill string in integers: its records and what is called. Written by `borechain firmware build`.
  *
  * A number in Qn counts 2^-n of its unit; angles without a Q are binary, 2^32 a turn. The layout is that of a saved
- * record, version {NODE_LAYOUT}. A step is called {CYCLE_RATE_HZ} times a second. Compile with -fwrapv or what your compiler has for it.
+ * record, version {NODE_LAYOUT}. A step is called {CYCLE_RATE_HZ} times a second. Compile with -fwrapv, or what your
+ * compiler has for it.
  * What is called carries the digest of the source in its name: a header of another source does not link.
  */
 #ifndef BORECHAIN_STEP_H
@@ -123,4 +127,3 @@ def _code(constants: str, functions: str) -> str:
 {constants}
 
 {functions}"""
-

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import ast
-import re
 import textwrap
 from typing import Any, NamedTuple
 
-from node.translation.c_kinds import (
+from node.translation.c_lines import LINE, break_line, fill_rows
+from node.translation.c_statements import CStatements
+from node.translation.c_structs import CStructs
+from node.translation.c_value import CValue, c_word, literal_of
+from node.translation.kernel_source import KernelSource, UntranslatableKernelError, integer_source
+from node.translation.kinds_of_values import (
     INTEGER,
     NOTHING,
     ArrayOf,
@@ -15,15 +19,9 @@ from node.translation.c_kinds import (
     Kind,
     RecordOf,
     Several,
-    declaration,
-    is_number,
+    declare_variable,
+    is_numeric,
 )
-from node.translation.c_records import Records
-from node.translation.c_statements import Statements
-from node.translation.c_value import Value, c_word, literal_of
-from node.translation.kernel_source import KernelSource, UntranslatableKernel, integer_source
-
-LINE = 110
 
 
 class Translated(NamedTuple):
@@ -41,7 +39,7 @@ class CProgram:
     records : names of the records
     """
 
-    def __init__(self, records: Records) -> None:
+    def __init__(self, records: CStructs) -> None:
         self._records = records
         self._functions: dict[tuple[Any, ...], Translated] = {}
         self._names: dict[str, int] = {}
@@ -59,7 +57,7 @@ class CProgram:
             found = wanted if k == 1 else f"{wanted}_{k}"
             if self._constants.setdefault(found, (literal_of(number), number))[1] == number:
                 return found
-        raise UntranslatableKernel(f"{name}: expected fewer than 100 constants of one name")
+        raise UntranslatableKernelError(f"{name}: expected fewer than 100 constants of one name")
 
     def table(self, name: str, numbers: tuple[int, ...]) -> str:
         """Name in C of a table of whole numbers."""
@@ -68,30 +66,30 @@ class CProgram:
             found = wanted if k == 1 else f"{wanted}_{k}"
             if self._tables.setdefault(found, (_narrowest(numbers), numbers))[1] == numbers:
                 return found
-        raise UntranslatableKernel(f"{name}: expected fewer than 100 tables of one name")
+        raise UntranslatableKernelError(f"{name}: expected fewer than 100 tables of one name")
 
     def struct_name(self, kind: RecordOf | Several) -> str:
         """Name of the struct of a record, or of several values, which is written where it was not yet."""
         if isinstance(kind, RecordOf):
             return self._records.name(kind.dtype)
         if kind not in self._several:
-            parts = ["int64_t at[%d]" % len(kind.kinds)] if kind.is_flat else [
-                declaration(part, f"part_{k}", self.struct_name) for k, part in enumerate(kind.kinds)
-            ]
+            parts = (
+                [f"int64_t at[{len(kind.kinds)}]"]
+                if kind.is_flat
+                else [declare_variable(part, f"part_{k}", self.struct_name) for k, part in enumerate(kind.kinds)]
+            )
             inside = "".join(f"    {part};\n" for part in parts)
             self._several[kind] = f"struct {kind.c_name} {{\n{inside}}};"
         return kind.c_name
 
-    def call(self, function: Any, given: list[Value], place: str) -> Value:
+    def call(self, function: Any, given: list[CValue], place: str) -> CValue:
         """Call of a kernel with these arguments, which is translated where it was not yet."""
         source = integer_source(function)
         if len(given) != len(source.arguments):
-            raise UntranslatableKernel(
+            raise UntranslatableKernelError(
                 f"{place}: expected {len(source.arguments)} arguments of {source.name}, got {len(given)}"
             )
-        kinds = tuple(
-            _handed_kind(source, name, value) for name, value in zip(source.arguments, given, strict=True)
-        )
+        kinds = tuple(_handed_kind(source, name, value) for name, value in zip(source.arguments, given, strict=True))
         found = self._function(function, source, kinds)
         handed: list[str] = []
         for value, kind in zip(given, kinds, strict=True):
@@ -99,13 +97,15 @@ class CProgram:
                 handed.append(value.address)
             if isinstance(kind, ArrayOf) and kind.counted:
                 handed.append(value.length)
-        return Value(f"{found.name}({', '.join(handed)})", found.returned)
+        return CValue(f"{found.name}({', '.join(handed)})", found.returned)
 
     def _function(self, function: Any, source: KernelSource, kinds: tuple[Kind, ...]) -> Translated:
         key = (function, *kinds)
         if key not in self._functions:
             if source.place in self._open:
-                raise UntranslatableKernel(f"{source.place}: expected no function that calls itself: {source.name}")
+                raise UntranslatableKernelError(
+                    f"{source.place}: expected no function that calls itself: {source.name}"
+                )
             self._open.append(source.place)
             self._functions[key] = self.write(source, kinds, self._free_name(source.name))
             self._open.pop()
@@ -120,20 +120,20 @@ class CProgram:
         given = {
             argument: _argument_value(argument, kind) for argument, kind in zip(source.arguments, kinds, strict=True)
         }
-        body = Statements(self, source, given)
+        body = CStatements(self, source, given)
         lines = body.translate()
         returned = body.returned or NOTHING
-        head = f"{static}{declaration(returned, name, self.struct_name)}({self._arguments(given)})"
-        self.texts.append("\n".join([_note(source), _broken(head) + "\n{", *map(_broken, lines), "}\n"]))
+        head = f"{static}{declare_variable(returned, name, self.struct_name)}({self._arguments(given)})"
+        self.texts.append("\n".join([_note(source), break_line(head) + "\n{", *map(break_line, lines), "}\n"]))
         self.returned[name] = returned
         return Translated(name, returned)
 
-    def _arguments(self, given: dict[str, Value]) -> str:
+    def _arguments(self, given: dict[str, CValue]) -> str:
         declared: list[str] = []
         for name, value in given.items():
             if not _is_handed(value.kind):
                 continue
-            declared.append(declaration(value.kind, c_word(name), self.struct_name))
+            declared.append(declare_variable(value.kind, c_word(name), self.struct_name))
             if isinstance(value.kind, ArrayOf) and value.kind.counted:
                 declared.append(f"int64_t {name}_length")
         return ", ".join(declared) or "void"
@@ -143,7 +143,7 @@ class CProgram:
         parts = [f"#define {name} {text}" for name, (text, _) in sorted(self._constants.items())]
         parts.extend(self._several.values())
         for name, (kind, numbers) in sorted(self._tables.items()):
-            rows = _filled([literal_of(number) for number in numbers])
+            rows = fill_rows([literal_of(number) for number in numbers])
             parts.append(f"static const {kind} {name}[{len(numbers)}] = {{\n{rows}\n}};")
         return "\n".join(parts)
 
@@ -152,25 +152,15 @@ def _narrowest(numbers: tuple[int, ...]) -> str:
     for bits in (8, 16, 32, 64):
         if all(-(1 << (bits - 1)) <= number < 1 << (bits - 1) for number in numbers):
             return f"int{bits}_t"
-    raise UntranslatableKernel(f"expected numbers of 64 bits, got up to {max(numbers)}")
+    raise UntranslatableKernelError(f"expected numbers of 64 bits, got up to {max(numbers)}")
 
 
-def _filled(words: list[str]) -> str:
-    rows, row = [], "   "
-    for word in words:
-        if len(row) + len(word) + 2 > LINE:
-            rows.append(row)
-            row = "   "
-        row += f" {word},"
-    return "\n".join([*rows, row.rstrip(",")])
-
-
-def _handed_kind(source: KernelSource, name: str, value: Value) -> Kind:
+def _handed_kind(source: KernelSource, name: str, value: CValue) -> Kind:
     """Kind of an argument, ``NOTHING`` of one that is not used; an array has a length only where that is asked for."""
     kind = value.kind
     if not _uses(source, name):
         return NOTHING
-    if is_number(kind):
+    if is_numeric(kind):
         return INTEGER if kind.c_name != "bool" else kind  # type: ignore[union-attr]
     if not isinstance(kind, ArrayOf):
         return kind
@@ -204,28 +194,13 @@ def _asks_length(source: KernelSource, name: str) -> bool:
     )
 
 
-def _argument_value(name: str, kind: Kind) -> Value:
+def _argument_value(name: str, kind: Kind) -> CValue:
     if isinstance(kind, FunctionOf):
-        return Value(name, kind)
+        return CValue(name, kind)
     counted = isinstance(kind, ArrayOf) and kind.counted
-    return Value(c_word(name), kind, length=f"{name}_length" if counted else "")
+    return CValue(c_word(name), kind, length=f"{name}_length" if counted else "")
 
 
 def _note(source: KernelSource) -> str:
     text = f"{source.summary} ({source.place})" if source.summary else source.place
     return "\n * ".join(textwrap.wrap(text.replace("``", ""), LINE - 3, initial_indent="/* ")) + " */"
-
-
-def _broken(line: str) -> str:
-    """A line that is not too long, broken behind commas and before operators."""
-    if len(line) <= LINE:
-        return line
-    indent = re.match(r" *", line)
-    assert indent is not None
-    rows, row = [], ""
-    for piece in re.split(r"(?<=, )|(?<= && )|(?<= \|\| )|(?<= [-+?:] )", line):
-        if row.strip() and len(row) + len(piece) > LINE:
-            rows.append(row.rstrip())
-            row = indent.group() + "    "
-        row += piece
-    return "\n".join([*rows, row])

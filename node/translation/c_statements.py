@@ -1,11 +1,14 @@
-"""Statements of a kernel in C."""
+"""CStatements of a kernel in C."""
 
 from __future__ import annotations
 
 import ast
 import re
-from node.translation.c_expressions import FOLDED, Expressions, Program
-from node.translation.c_kinds import (
+
+from node.translation.c_expressions import FOLDED, CContext, CExpressions
+from node.translation.c_value import SUM, CValue, c_word, several_values
+from node.translation.kernel_source import KernelSource
+from node.translation.kinds_of_values import (
     INTEGER,
     NOTHING,
     TRUTH,
@@ -15,18 +18,16 @@ from node.translation.c_kinds import (
     Plain,
     RecordOf,
     Several,
-    declaration,
-    is_number,
-    united,
+    declare_variable,
+    is_numeric,
+    unite_kinds,
 )
-from node.translation.c_value import SUM, Value, c_word, several_values
-from node.translation.kernel_source import KernelSource
 from node.translation.variable_places import Block, declare_places, stored_names
 
 STEP = "    "
 
 
-class Statements:
+class CStatements:
     """Translates the body of one function, twice: what a variable is may show only after its first use.
 
     Parameters
@@ -36,9 +37,9 @@ class Statements:
     given : value of each argument, as the body names it
     """
 
-    def __init__(self, program: Program, source: KernelSource, given: dict[str, Value]) -> None:
+    def __init__(self, program: CContext, source: KernelSource, given: dict[str, CValue]) -> None:
         self._program, self._source, self._given = program, source, given
-        self._expressions = Expressions(program, source.names, source.place)
+        self._expressions = CExpressions(program, source.names, source.place)
         stored = stored_names(source.body)
         self._places = declare_places(source.body, tuple(given))
         self._own = stored - set(given)
@@ -64,9 +65,9 @@ class Statements:
             return False
         return sum(len(re.findall(rf"\b{declared[1]}\b", other)) for other in self._lines) == 1
 
-    def _variable(self, name: str) -> Value:
+    def _variable(self, name: str) -> CValue:
         kind = self._kinds[name]
-        return Value(c_word(name), kind, length=f"{name}_length" if _is_counted(kind) else "")
+        return CValue(c_word(name), kind, length=f"{name}_length" if _is_counted(kind) else "")
 
     def _emit(self, depth: int, line: str) -> None:
         self._lines.append(f"{STEP * depth}{line}")
@@ -79,7 +80,7 @@ class Statements:
             self._statement(statement, (*block, (number, "body")), depth)
 
     def _declared(self, name: str) -> str:
-        return declaration(self._kinds[name], c_word(name), self._program.struct_name)
+        return declare_variable(self._kinds[name], c_word(name), self._program.struct_name)
 
     def _statement(self, statement: ast.stmt, inner: Block, depth: int) -> None:
         method = getattr(self, f"_{type(statement).__name__.lower()}", None)
@@ -101,10 +102,10 @@ class Statements:
             self._emit(depth, "return;")
             return
         found = self._expressions.value(statement.value)
-        if not (is_number(found.kind) or isinstance(found.kind, Several)):
+        if not (is_numeric(found.kind) or isinstance(found.kind, Several)):
             raise self._expressions.refuse(statement, "expected numbers to return")
-        kind = INTEGER if is_number(found.kind) and found.kind != TRUTH else found.kind
-        self.returned = kind if self.returned is None else united(self.returned, kind)
+        kind = INTEGER if is_numeric(found.kind) and found.kind != TRUTH else found.kind
+        self.returned = kind if self.returned is None else unite_kinds(self.returned, kind)
         self._emit(depth, f"return {found.code};")
 
     def _expr(self, statement: ast.Expr, _: Block, depth: int) -> None:
@@ -156,7 +157,7 @@ class Statements:
         self._emit(depth, f"static const int64_t {name}_of[{count}] = {{{numbers}}};")
         self._emit(depth, f"for (int64_t {name}_at = 0; {name}_at < {count}; {name}_at++) {{")
         self._emit(depth + 1, f"const int64_t {name} = {name}_of[{name}_at];")
-        self._expressions.variables[statement.target.id] = Value(name, INTEGER)
+        self._expressions.variables[statement.target.id] = CValue(name, INTEGER)
 
     def _over_range(self, statement: ast.For, depth: int) -> None:
         call, name = statement.iter, getattr(statement.target, "id", "")
@@ -172,7 +173,7 @@ class Statements:
         if end.known is None:
             start, until = f"{start}, {name}_end = {end.code}", f"{name}_end"
         self._emit(depth, f"for ({start}; {counter} {sign} {until}; {counter}{'++' if step == 1 else '--'}) {{")
-        self._expressions.variables[name] = Value(counter, INTEGER)
+        self._expressions.variables[name] = CValue(counter, INTEGER)
 
     def _annassign(self, statement: ast.AnnAssign, _: Block, depth: int) -> None:
         if statement.value is not None:
@@ -201,7 +202,7 @@ class Statements:
         else:
             self._store(statement, target, found, depth)
 
-    def _unpack(self, statement: ast.Assign, target: ast.Tuple, found: Value, depth: int) -> None:
+    def _unpack(self, statement: ast.Assign, target: ast.Tuple, found: CValue, depth: int) -> None:
         if found.parts is None:
             found = self._held(found, depth)
         parts = self._expressions.parts_of(found)
@@ -212,29 +213,29 @@ class Statements:
         for one, part in zip(target.elts, parts, strict=True):
             self._store(statement, one, part, depth)
 
-    def _held(self, found: Value, depth: int) -> Value:
+    def _held(self, found: CValue, depth: int) -> CValue:
         """A value that is computed now and used later."""
         name = f"held_{self._temporaries}"
         self._temporaries += 1
-        kind = INTEGER if is_number(found.kind) else found.kind
-        self._emit(depth, f"const {declaration(kind, name, self._program.struct_name)} = {found.code};")
-        return Value(name, kind)
+        kind = INTEGER if is_numeric(found.kind) else found.kind
+        self._emit(depth, f"const {declare_variable(kind, name, self._program.struct_name)} = {found.code};")
+        return CValue(name, kind)
 
-    def _store(self, statement: ast.stmt, target: ast.expr, found: Value, depth: int) -> None:
+    def _store(self, statement: ast.stmt, target: ast.expr, found: CValue, depth: int) -> None:
         if isinstance(target, ast.Name):
             self._store_variable(statement, target.id, found, depth)
             return
         place = self._expressions.value(target)
-        if not (isinstance(place.kind, Plain) and is_number(found.kind)):
+        if not (isinstance(place.kind, Plain) and is_numeric(found.kind)):
             raise self._expressions.refuse(statement, "expected a number to store")
         narrow = place.kind not in (INTEGER, TRUTH) and found.kind != place.kind
         self._emit(depth, f"{place.code} = {f'({place.kind.c_name}){found.within(0)}' if narrow else found.code};")
 
-    def _store_variable(self, statement: ast.stmt, name: str, found: Value, depth: int) -> None:
+    def _store_variable(self, statement: ast.stmt, name: str, found: CValue, depth: int) -> None:
         kind = _kept_kind(found)
         if isinstance(kind, FunctionOf):
             raise self._expressions.refuse(statement, "expected a value")
-        self._kinds[name] = united(self._kinds.get(name), kind)
+        self._kinds[name] = unite_kinds(self._kinds.get(name), kind)
         if found.parts is not None and not isinstance(found.kind, ArrayOf):
             found = several_values(found.parts)
         self._expressions.variables[name] = self._variable(name)
@@ -249,8 +250,8 @@ def _is_counted(kind: Kind) -> bool:
     return isinstance(kind, ArrayOf) and kind.counted
 
 
-def _kept_kind(found: Value) -> Kind:
-    if is_number(found.kind):
+def _kept_kind(found: CValue) -> Kind:
+    if is_numeric(found.kind):
         return TRUTH if found.kind == TRUTH else INTEGER
     if isinstance(found.kind, ArrayOf) and found.length:
         return ArrayOf(found.kind.element, found.kind.shape, counted=True)

@@ -5,20 +5,71 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
-from node.translation.c_kinds import INTEGER, TRUTH, ArrayOf, Kind, RecordOf, Several
+from node.translation.kinds_of_values import INTEGER, TRUTH, ArrayOf, Kind, RecordOf, Several
 
 # how tightly an operator binds, loosest last
 ATOM, UNARY, PRODUCT, SUM, COMPARED, LOGICAL, CHOSEN = range(7)
 INT32: Final = 1 << 31
 RESERVED: Final = frozenset(
-    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
-    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true "
-    "false asm div abs labs index gamma y0 y1 yn j0 j1 jn least most magnitude".split()
+    [
+        "auto",
+        "break",
+        "case",
+        "char",
+        "const",
+        "continue",
+        "default",
+        "do",
+        "double",
+        "else",
+        "enum",
+        "extern",
+        "float",
+        "for",
+        "goto",
+        "if",
+        "inline",
+        "int",
+        "long",
+        "register",
+        "restrict",
+        "return",
+        "short",
+        "signed",
+        "sizeof",
+        "static",
+        "struct",
+        "switch",
+        "typedef",
+        "union",
+        "unsigned",
+        "void",
+        "volatile",
+        "while",
+        "bool",
+        "true",
+        "false",
+        "asm",
+        "div",
+        "abs",
+        "labs",
+        "index",
+        "gamma",
+        "y0",
+        "y1",
+        "yn",
+        "j0",
+        "j1",
+        "jn",
+        "least",
+        "most",
+        "magnitude",
+    ]
 )
 
 
 @dataclass(frozen=True)
-class Value:
+class CValue:
     """One value.
 
     Attributes
@@ -36,7 +87,7 @@ class Value:
     kind: Kind
     level: int = ATOM
     known: Any = None
-    parts: tuple[Value, ...] | None = None
+    parts: tuple[CValue, ...] | None = None
     length: str = ""
     is_place: bool = False
 
@@ -64,29 +115,29 @@ def literal_of(number: int) -> str:
     return f"INT64_C({text})" if number > 0 else f"(-INT64_C({text}))"
 
 
-def number_value(number: int) -> Value:
+def number_value(number: int) -> CValue:
     """A whole number that stands in the source."""
-    return Value(literal_of(number), INTEGER, UNARY if -INT32 < number < 0 else ATOM, int(number))
+    return CValue(literal_of(number), INTEGER, UNARY if -INT32 < number < 0 else ATOM, int(number))
 
 
-def truth_value(truth: bool) -> Value:
+def truth_value(truth: bool) -> CValue:
     """A truth that stands in the source."""
-    return Value("true" if truth else "false", TRUTH, known=truth)
+    return CValue("true" if truth else "false", TRUTH, known=truth)
 
 
-def several_values(parts: tuple[Value, ...]) -> Value:
+def several_values(parts: tuple[CValue, ...]) -> CValue:
     """Several values that stand beside each other in the source."""
     kind = Several(tuple(part.kind if isinstance(part.kind, Several) else INTEGER for part in parts))
     inside = ", ".join(part.code for part in parts)
     inside = f"{{{inside}}}" if kind.is_flat else inside
-    return Value(f"(struct {kind.c_name}){{{inside}}}", kind, parts=parts)
+    return CValue(f"(struct {kind.c_name}){{{inside}}}", kind, parts=parts)
 
 
-def element_of(array: Value, index: str) -> Value:
+def element_of(array: CValue, index: str) -> CValue:
     """One element of an array, or one row of it."""
     kind = array.kind
     assert isinstance(kind, ArrayOf)
     code = f"{array.within(ATOM)}[{index}]"
     if len(kind.shape) > 1:
-        return Value(code, ArrayOf(kind.element, kind.shape[1:]))
-    return Value(code, kind.element, is_place=isinstance(kind.element, RecordOf))
+        return CValue(code, ArrayOf(kind.element, kind.shape[1:]))
+    return CValue(code, kind.element, is_place=isinstance(kind.element, RecordOf))

@@ -19,7 +19,7 @@ from node.errors import NodeConfigurationError
 INTEGERS_AT: Final = {"by_type": 0, "by_record": 0, "taken_where": 1}  # argument of a decorator that serves integers
 
 
-class UntranslatableKernel(NodeConfigurationError):
+class UntranslatableKernelError(NodeConfigurationError):
     """A kernel says what C is not made of here; the message names file and line."""
 
 
@@ -55,7 +55,7 @@ def integer_source(function: Callable[..., Any]) -> KernelSource:
 
     Raises
     ------
-    UntranslatableKernel
+    UntranslatableKernelError
         When there is no source of it.
     """
     plain = python_function(function)
@@ -75,10 +75,12 @@ def _tree_of(plain: Callable[..., Any]) -> tuple[ast.FunctionDef, str]:
     try:
         lines, first = inspect.getsourcelines(plain)
     except (OSError, TypeError) as error:
-        raise UntranslatableKernel(f"{plain!r}: expected a function with a source, got one without ({error})") from None
+        raise UntranslatableKernelError(
+            f"{plain!r}: expected a function with a source, got one without ({error})"
+        ) from None
     tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
     if not isinstance(tree, ast.FunctionDef):
-        raise UntranslatableKernel(f"{plain!r}: expected a function, got {type(tree).__name__}")
+        raise UntranslatableKernelError(f"{plain!r}: expected a function, got {type(tree).__name__}")
     ast.increment_lineno(tree, first - 1)
     return tree, f"{'/'.join(Path(inspect.getfile(plain)).parts[-4:])}:{tree.lineno}"
 

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 Block: TypeAlias = tuple[tuple[int, str], ...]  # statements and their parts, from the function inwards
 
 
-class Use(NamedTuple):
+class NameUse(NamedTuple):
     """One use of a name: the block, the statement of it, and whether that plainly stores."""
 
     block: Block
@@ -32,7 +32,7 @@ class Declarations(NamedTuple):
 
 def declare_places(body: list[ast.stmt], arguments: tuple[str, ...]) -> Declarations:
     """Where each variable of a function with this ``body`` is declared, but for its arguments and counters of loops."""
-    uses: dict[str, list[Use]] = {}
+    uses: dict[str, list[NameUse]] = {}
     for name, use in _uses_of(body, (), frozenset(arguments)):
         uses.setdefault(name, []).append(use)
     found = Declarations({}, {})
@@ -55,7 +55,7 @@ def _common(one: Block, other: Block) -> Block:
     return one[:count]
 
 
-def _uses_of(body: list[ast.stmt], block: Block, given: frozenset[str]) -> Iterator[tuple[str, Use]]:
+def _uses_of(body: list[ast.stmt], block: Block, given: frozenset[str]) -> Iterator[tuple[str, NameUse]]:
     for number, statement in enumerate(body):
         if isinstance(statement, ast.For):
             yield from _names_in(statement.iter, block, statement, given)
@@ -69,7 +69,7 @@ def _uses_of(body: list[ast.stmt], block: Block, given: frozenset[str]) -> Itera
             yield from _names_in_order(statement, block, given)
 
 
-def _names_in_order(statement: ast.stmt, block: Block, given: frozenset[str]) -> Iterator[tuple[str, Use]]:
+def _names_in_order(statement: ast.stmt, block: Block, given: frozenset[str]) -> Iterator[tuple[str, NameUse]]:
     """What a statement reads comes before what it stores."""
     if isinstance(statement, ast.Assign | ast.AnnAssign):
         if statement.value is not None:
@@ -83,10 +83,10 @@ def _names_in_order(statement: ast.stmt, block: Block, given: frozenset[str]) ->
 
 def _names_in(
     node: ast.AST, block: Block, statement: ast.stmt, given: frozenset[str], *, stores: bool = False
-) -> Iterator[tuple[str, Use]]:
+) -> Iterator[tuple[str, NameUse]]:
     for inner in ast.walk(node):
         if isinstance(inner, ast.Name) and inner.id not in given:
-            yield inner.id, Use(block, statement, stores and isinstance(inner.ctx, ast.Store))
+            yield inner.id, NameUse(block, statement, stores and isinstance(inner.ctx, ast.Store))
 
 
 def stored_names(body: list[ast.stmt]) -> set[str]:

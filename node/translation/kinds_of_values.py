@@ -8,7 +8,7 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from node.translation.kernel_source import UntranslatableKernel
+from node.translation.kernel_source import UntranslatableKernelError
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def kind_of_dtype(dtype: np.dtype[Any]) -> Kind:
 
     Raises
     ------
-    UntranslatableKernel
+    UntranslatableKernelError
         When it holds floats or anything else that is no integer.
     """
     if dtype.subdtype is not None:
@@ -100,33 +100,33 @@ def kind_of_dtype(dtype: np.dtype[Any]) -> Kind:
         return RecordOf(dtype)
     found = NUMBERS.get(dtype)
     if found is None:
-        raise UntranslatableKernel(f"expected a field of integers, got {dtype}")
+        raise UntranslatableKernelError(f"expected a field of integers, got {dtype}")
     return found
 
 
-def is_number(kind: Kind) -> bool:
+def is_numeric(kind: Kind) -> bool:
     """Whether it is one integer or truth."""
     return isinstance(kind, Plain) and kind != NOTHING
 
 
-def united(one: Kind | None, other: Kind) -> Kind:
+def unite_kinds(one: Kind | None, other: Kind) -> Kind:
     """Kind of a variable that is given both.
 
     Raises
     ------
-    UntranslatableKernel
+    UntranslatableKernelError
         When there is none.
     """
     if one is None or one == other:
         return other
-    if is_number(one) and is_number(other):
+    if is_numeric(one) and is_numeric(other):
         return INTEGER
     if isinstance(one, ArrayOf) and isinstance(other, ArrayOf) and one.shape[1:] == other.shape[1:]:
         return one
-    raise UntranslatableKernel(f"expected one kind for a variable, got {one} and {other}")
+    raise UntranslatableKernelError(f"expected one kind for a variable, got {one} and {other}")
 
 
-def declaration(kind: Kind, name: str, struct_name: Callable[[RecordOf | Several], str]) -> str:
+def declare_variable(kind: Kind, name: str, struct_name: Callable[[RecordOf | Several], str]) -> str:
     """How C declares a variable ``name``; ``struct_name`` gives the name of a struct, and sees to it that it is one."""
     if isinstance(kind, Plain):
         return f"{kind.c_name} {name}"
@@ -135,6 +135,6 @@ def declaration(kind: Kind, name: str, struct_name: Callable[[RecordOf | Several
     if isinstance(kind, RecordOf):
         return f"struct {struct_name(kind)} *{name}"
     assert isinstance(kind, ArrayOf)
-    held = declaration(kind.element, "", struct_name).replace(" *", "").strip()
+    held = declare_variable(kind.element, "", struct_name).replace(" *", "").strip()
     inner = "".join(f"[{length}]" for length in kind.shape[1:])
     return f"{held} (*{name}){inner}" if inner else f"{held} *{name}"

@@ -1,4 +1,4 @@
-"""Records of the kernels as structs of C: the same bytes at the same places, with what each field is and counts."""
+"""CStructs of the kernels as structs of C: the same bytes at the same places, with what each field is and counts."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ import numpy as np
 
 from node.kernels.record import filter_record, integer_filter, integer_node, node_record, sensor_record
 from node.kernels.record.integer_node import COPIED, OWN_FORMATS, G, in_integers
-from node.translation.c_kinds import NUMBERS
 from node.translation.c_value import c_word
-from node.translation.kernel_source import UntranslatableKernel
+from node.translation.kernel_source import UntranslatableKernelError
+from node.translation.kinds_of_values import NUMBERS
 
 MODULES: Final[tuple[ModuleType, ...]] = (integer_filter, filter_record, sensor_record, node_record, integer_node)
 PREFIX: Final = "borechain_"
 
 
-class Records:
+class CStructs:
     """Structs of all records that a program names, each after those that it holds."""
 
     def __init__(self) -> None:
@@ -35,9 +35,12 @@ class Records:
         if dtype not in self._written:
             label, comments = self._known.get(dtype, ("", {}))
             if not label:
-                raise UntranslatableKernel(f"expected a record that a module of the kernels names, got {dtype}")
-            self._written[dtype] = f"{PREFIX}{label}"
-            self._texts.append(self._struct(dtype, f"{PREFIX}{label}", comments))
+                raise UntranslatableKernelError(f"expected a record that a module of the kernels names, got {dtype}")
+            name = f"{PREFIX}{label}"
+            if name in self._written.values():
+                raise UntranslatableKernelError(f"expected one record of the name {label}, got two")
+            self._written[dtype] = name
+            self._texts.append(self._struct(dtype, name, comments))
         return self._written[dtype]
 
     def text(self) -> str:
@@ -84,8 +87,10 @@ def _known_records() -> dict[np.dtype[Any], tuple[str, dict[str, str]]]:
             whole = _all_integers(value)
             made = value if whole else in_integers(value)
             if not whole:
-                own = {field: _with_format(name.lower(), field, value, own.get(field, "")) for field in value.names or ()}
-            found.setdefault(made, (name.lower(), own))
+                own = {
+                    field: _with_format(name.lower(), field, value, own.get(field, "")) for field in value.names or ()
+                }
+            found.setdefault(made, (name.lower().removeprefix("fixed_"), own))
     return found
 
 
