@@ -68,23 +68,37 @@ def write_c_files() -> CFiles:
     """
     records = CStructs()
     program = CProgram(records)
-    prototypes = [_entry(program, name) for name in ENTRIES]
-    functions, constants, structs = "\n".join(program.texts), program.constants_text(), records.text()
+    entries = [_entry(program, name) for name in ENTRIES]
+    prototypes = [prototype for prototype, _ in entries]
+    functions = "\n".join([*program.texts, *(text for _, text in entries)])
+    constants, structs = program.constants_text(), records.text()
     digest = hashlib.sha256("\0".join((structs, constants, functions)).encode()).hexdigest()[:16]
     header = _header(structs, prototypes, digest)
     code = _code(constants, functions)
     return CFiles(header, code, digest, tuple(f"{PREFIX}{name}_{digest}" for name in ENTRIES))
 
 
-def _entry(program: CProgram, name: str) -> str:
+def _entry(program: CProgram, name: str) -> tuple[str, str]:
+    """Prototype and text of an entry point: a node with more IMUs than the records have room for is refused."""
     function, kinds = ENTRIES[name]
     source = integer_source(function)
-    made = program.write(source, kinds, f"{PREFIX}{name}", static="")
+    made = program.write(source, kinds, source.name)
     arguments = ", ".join(
         declare_variable(kind, c_word(argument), program.struct_name)
         for argument, kind in zip(source.arguments, kinds, strict=True)
     )
-    return break_line(f"{declare_variable(made.returned, made.name, program.struct_name)}({arguments});")
+    prototype = break_line(f"{declare_variable(made.returned, PREFIX + name, program.struct_name)}({arguments})")
+    call = f"{made.name}({', '.join(map(c_word, source.arguments))})"
+    text = f"""\
+{prototype}
+{{
+    if (settings->imus < 1 || settings->imus > BORECHAIN_IMUS) {{
+        return BORECHAIN_OTHER_LAYOUT;
+    }}
+    return {call};
+}}
+"""
+    return f"{prototype};", text
 
 
 def _header(structs: str, prototypes: list[str], digest: str) -> str:
@@ -107,6 +121,7 @@ def _header(structs: str, prototypes: list[str], digest: str) -> str:
 #define BORECHAIN_DIGEST "{digest}"
 #define BORECHAIN_LAYOUT {NODE_LAYOUT}
 #define BORECHAIN_IMUS {MAX_IMUS}
+#define BORECHAIN_OTHER_LAYOUT (-2) /* answer: the settings are of a node that these records have no room for */
 
 {CHECKS}
 {structs}

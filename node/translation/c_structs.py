@@ -20,6 +20,7 @@ from node.translation.kinds_of_values import NUMBERS
 
 MODULES: Final[tuple[ModuleType, ...]] = (integer_filter, filter_record, sensor_record, node_record, integer_node)
 PREFIX: Final = "borechain_"
+FIXED: Final = "fixed_"  # of a record that the kernels write in integers themselves
 
 
 class CStructs:
@@ -75,22 +76,26 @@ class CStructs:
 def _known_records() -> dict[np.dtype[Any], tuple[str, dict[str, str]]]:
     """Name and comments of every record of the kernels, by its form in integers."""
     found: dict[np.dtype[Any], tuple[str, dict[str, str]]] = {}
+    floats: dict[str, dict[str, str]] = {}
     for module in MODULES:
-        notes = _field_comments(module)
+        notes = {
+            name: {field: note for field, note in fields.items() if note}
+            for name, fields in _field_comments(module).items()
+        }
         for name, given in vars(module).items():
             if not (name.isupper() and _is_record(given)):
                 continue
             value = np.dtype(given, align=True)
             if value.fields is None:
                 continue
-            own = dict(notes.get(name, {}))
-            whole = _all_integers(value)
-            made = value if whole else in_integers(value)
-            if not whole:
-                own = {
-                    field: _with_format(name.lower(), field, value, own.get(field, "")) for field in value.names or ()
+            label, own = name.lower().removeprefix(FIXED), notes.get(name, {})
+            if _all_integers(value):
+                found.setdefault(value, (label, floats.get(label, {}) | own))
+            elif label not in floats:  # the first module that has it is the one that makes it
+                floats[label] = {
+                    field: _with_format(label, field, value, own.get(field, "")) for field in value.names or ()
                 }
-            found.setdefault(made, (name.lower().removeprefix("fixed_"), own))
+                found.setdefault(in_integers(value), (label, floats[label]))
     return found
 
 
@@ -113,7 +118,7 @@ def _with_format(group: str, field: str, dtype: np.dtype[Any], note: str) -> str
     base = base.subdtype[0] if base.subdtype else base
     if base.kind != "f":
         return note
-    found = OWN_FORMATS.get(f"{group}.{field}", OWN_FORMATS.get(field, COPIED))
+    found = OWN_FORMATS.get(f"{group}.{field}", OWN_FORMATS.get(f"{group}s.{field}", OWN_FORMATS.get(field, COPIED)))
     formats = sorted({int(one) for one in np.unique(np.asarray(found))})
     if formats == [COPIED]:
         return note
