@@ -5,6 +5,7 @@ The oracle is the numba step; the C is made from the source by another translato
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -198,5 +199,4 @@ def test_the_code_names_functions_fields_and_units_of_the_source(written: CFiles
     assert "int64_t static_bias[3]; /* rad/s, Q46 */" in written.header
     assert "int64_t raw_force[3]; /* g, likewise, Q26 */" in written.header
     assert "LIES_AT(borechain_state, now_yaw," in written.header
-    assert "double" not in written.code
-    assert "float" not in written.code.replace("floats", "")
+    assert re.findall("float|double", re.sub(r"/\*.*?\*/", "", written.code, flags=re.DOTALL)) == []
