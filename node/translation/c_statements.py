@@ -7,7 +7,7 @@ import re
 
 from node.translation.c_expressions import FOLDED, CContext, CExpressions
 from node.translation.c_value import SUM, CValue, c_word, several_values
-from node.translation.kernel_source import KernelSource
+from node.translation.kernel_source import KernelSource, UntranslatableKernelError
 from node.translation.kinds_of_values import (
     INTEGER,
     NOTHING,
@@ -235,7 +235,10 @@ class CStatements:
         kind = _kept_kind(found)
         if isinstance(kind, FunctionOf):
             raise self._expressions.refuse(statement, "expected a value")
-        self._kinds[name] = unite_kinds(self._kinds.get(name), kind)
+        try:
+            self._kinds[name] = unite_kinds(self._kinds.get(name), kind)
+        except UntranslatableKernelError as error:
+            raise self._expressions.refuse(statement, str(error)) from None
         if found.parts is not None and not isinstance(found.kind, ArrayOf):
             found = several_values(found.parts)
         self._expressions.variables[name] = self._variable(name)

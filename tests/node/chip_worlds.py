@@ -5,7 +5,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from one_node import node_of
 from rough_node import RoughNode
+from string_of_one import StringOfOne
 from test_every_event import CASES, known
+from test_smoothing import OUTAGES
 
 from node.kernels.arithmetic.formats import DEG
 from node.kernels.step import fixed_node
@@ -47,3 +49,9 @@ def every_world(cycles: int) -> Iterator[Callable[[], object]]:
     yield lambda: aligned("circle")
     yield lambda: aligned("extremes")
     yield recorded
+
+
+def smoothed_strings() -> Iterator[Callable[[], object]]:
+    """Tubes with outages of the aiding, whose surveys are said again by what came later; blocks that turn, and faults."""
+    for seed in (5, 6):
+        yield lambda seed=seed: StringOfOne(seed, node={"kernel": "fixed"}, **OUTAGES).run()
