@@ -52,6 +52,6 @@ def every_world(cycles: int) -> Iterator[Callable[[], object]]:
 
 
 def smoothed_strings() -> Iterator[Callable[[], object]]:
-    """Tubes with outages of the aiding, whose surveys are said again by what came later; blocks that turn, and faults."""
+    """Tubes with outages of the aiding, whose surveys are said again by what came later."""
     for seed in (5, 6):
         yield lambda seed=seed: StringOfOne(seed, node={"kernel": "fixed"}, **OUTAGES).run()
