@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from node.translation.chip_program import BARE
 from node.translation.toolchains import OPTIONS, TOOLCHAINS
 
 HERE = Path(__file__).parent / "chip"
@@ -62,8 +63,8 @@ def compile_for_chip(folder: Path, target: str) -> Path:
             "--specs=rdimon.specs",
             "-DCOUNT_ON_CHIP",
             "-T",
-            HERE / "mps2.ld",
-            HERE / "startup.c",
+            BARE / "mps2.ld",
+            BARE / "startup.c",
             HERE / "replay.c",
         )
     made = run_program(

@@ -51,8 +51,9 @@ def plant_switches(code: str, random: np.random.Generator) -> tuple[str, int]:
             continue
         for pattern, made in SITES:
             found.extend((k, match.start(), match.end(), match.expand(made)) for match in pattern.finditer(line))
+    found.sort()
     chosen = sorted(random.choice(len(found), PLANTED, replace=False))
-    for number in reversed(range(PLANTED)):
+    for number in reversed(range(PLANTED)):  # from the end of the text, so that places before stay where they are
         k, start, end, made = found[chosen[number]]
         lines[k] = lines[k][:start] + made.format(n=number + 1) + lines[k][end:]
     return "\n".join(lines), len(found)
