@@ -49,6 +49,7 @@ COMMANDS = {
         "Judge a wall: overlap, thickness, probability of a gap.",
     ),
     "link": ("borechain.cli.link.link", "link", "Between tubes: radio through soil and pipe, load of a CAN bus."),
+    "firmware": ("borechain.cli.firmware.firmware", "firmware", "The step of a node in C, for a chip."),
     "bench": ("borechain.cli.bench.bench", "bench", "Measure speed side by side with other libraries."),
     "campaign": (
         "borechain.cli.campaign.campaign",
