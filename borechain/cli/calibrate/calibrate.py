@@ -6,6 +6,7 @@ import click
 
 from borechain.cli.calibrate.linear import attitudes, turntable
 from borechain.cli.calibrate.mwd import magnetometer, mwd, qc
+from borechain.cli.calibrate.record_reader import record_reader
 
 
 @click.group()
@@ -23,5 +24,5 @@ def calibrate() -> None:
     """
 
 
-for command in (turntable, attitudes, mwd, magnetometer, qc):
+for command in (turntable, attitudes, mwd, magnetometer, qc, record_reader):
     calibrate.add_command(command)
