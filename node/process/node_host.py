@@ -46,7 +46,7 @@ def run_node(
     def build(timing: CycleTiming | None = None) -> TubeProcess:
         process = TubeProcess(settings, place.folder, key=key, imus=imus, timing=timing, seals=seals)
         for imu in imus:
-            if isinstance(imu, ReplayImu | TimedImu):
+            if isinstance(imu, ReplayImu | TimedImu) and imu.understood:
                 write_warning(name, imu.understood)
         loop = kernel_of(settings.kernel)
         warm_step(loop.step, loop.aiding)  # half a minute on a cold machine: before the token of life

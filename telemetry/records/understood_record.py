@@ -10,6 +10,7 @@ from telemetry.records.column_names import TIME
 from telemetry.records.imu_record import ImuRecord
 
 SHOWN: Final = 3  # of a list
+NO_FAULT: Final = "no gap, no fault"
 
 
 def understood_line(record: ImuRecord) -> str:
@@ -47,7 +48,7 @@ def fault_phrases(record: ImuRecord) -> list[str]:
         at = np.flatnonzero(record.saturated & bit)
         if at.size:
             found.append(f"{sensor} at its range in {at.size} rows, the first in line {lines[at[0]]}")
-    return found or ["no gap, no fault"]
+    return found or [NO_FAULT]
 
 
 def understood_object(record: ImuRecord) -> dict[str, Any]:
@@ -64,7 +65,7 @@ def understood_object(record: ImuRecord) -> dict[str, Any]:
         "not_used": list(record.ignored),
         "bursts_s": list(stamps.bursts) if stamps is not None and stamps.bursts is not None else None,
         "gaps": [{"line": int(record.lines[k]), "length_s": length} for k, length in (stamps.gaps if stamps else ())],
-        "faults": [] if (found := fault_phrases(record)) == ["no gap, no fault"] else found,
+        "faults": [] if (found := fault_phrases(record)) == [NO_FAULT] else found,
         "record_sha256": record.sha256,
     }
 

@@ -19,15 +19,19 @@ from node.process.drivers.source import ImuSample
 from telemetry.errors import RecordError
 from telemetry.records.column_names import FORCE, RATE
 from telemetry.records.imu_record import ImuRecord, read_imu_record
+from telemetry.records.record_columns import OWN_NAMES
 from telemetry.records.record_reading import RecordReading
-from telemetry.records.understood_record import understood_line
+from telemetry.records.understood_record import NO_FAULT, fault_phrases, understood_line
 
 Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NodeRecord:
-    """A record that a node can take: ``times`` (n,) s, ``readings`` (n, 6 or 7) in rad/s, m/s^2, C."""
+    """A record that a node can take: ``times`` (n,) s, ``readings`` (n, 6 or 7) in rad/s, m/s^2, C.
+
+    ``understood`` is the line to be told; of a node's own recording without a fault there is nothing to tell.
+    """
 
     record: ImuRecord
     times: Array
@@ -51,7 +55,9 @@ def load_record(path: Path, reading: RecordReading) -> NodeRecord:
         raise SensorError(str(error)) from error
     if record.temperature is not None:
         columns.append(record.temperature[:, None])
-    return NodeRecord(record, times, np.hstack(columns), understood_line(record))
+    own_form = tuple(name for one in record.placed.values() for name in one.names) in (OWN_NAMES[:7], OWN_NAMES)
+    is_plain = own_form and fault_phrases(record) == [NO_FAULT]
+    return NodeRecord(record, times, np.hstack(columns), "" if is_plain else understood_line(record))
 
 
 class RecordedMeans:
