@@ -13,15 +13,14 @@ import numpy.typing as npt
 from groundstation.calibration.allan_analysis import (
     AXES,
     AllanResult,
-    FilterNoise,
     analyse_allan_deviation,
-    filter_noise_of,
 )
+from groundstation.calibration.bias_model import LEARNT, SPANS, FilterNoise, drift_std, fit_bias_model, seen_drift
 from groundstation.calibration.laboratory_tables import check_range
 from groundstation.report.calibration_sheets import allan_sheet
 from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome, naming_file
 from groundstation.report.calibrations.calibration_request import AllanRequest, RecordWords
-from telemetry.errors import CalibrationError, RecordError
+from telemetry.errors import RecordError
 from telemetry.records.column_names import FIELD, FORCE, RATE, UNITS, known_unit
 from telemetry.records.imu_record import ImuRecord, has_bare_triad, read_imu_record
 from telemetry.records.understood_record import understood_line, understood_object
@@ -40,9 +39,10 @@ def answer_allan(request: AllanRequest, day: str) -> CalibrationOutcome:
     rate = record.row_rate()
     with naming_file(request.file):
         curves = analyse_allan_deviation(found[part], rate)
-    noises = [noise_of(result) for result in curves]
+    noises = [fit_bias_model(result.tau, result.deviation, result.confidence) for result in curves]
+    drifts = [drift_json(noise, found[part, k], rate) for k, noise in enumerate(noises)]
     count = part.stop - part.start
-    axes = {name: allan_axis_json(result, noise) for name, result, noise in zip(AXES, curves, noises, strict=True)}
+    axes = {name: allan_axis_json(*of_axis) for name, *of_axis in zip(AXES, curves, noises, drifts, strict=True)}
     lines = [int(record.lines[part.start]), int(record.lines[part.stop - 1])]
     result = {
         "axes": axes,
@@ -68,7 +68,9 @@ def answer_allan(request: AllanRequest, day: str) -> CalibrationOutcome:
         return allan_panels(curves, unit)
 
     text = json.dumps(result, indent=1, allow_nan=False) + "\n"
-    return CalibrationOutcome(result, text, None, record.sha256, allan_sheet(curves, noises, unit, facts), panels)
+    return CalibrationOutcome(
+        result, text, None, record.sha256, allan_sheet(curves, noises, drifts, unit, facts), panels
+    )
 
 
 def static_readings(request: AllanRequest) -> tuple[ImuRecord, npt.NDArray[np.float64], str]:
@@ -110,15 +112,14 @@ def _with_unit(words: RecordWords, request: AllanRequest) -> RecordWords:
     return words
 
 
-def noise_of(result: AllanResult) -> FilterNoise | None:
-    """White and Gauss-Markov noise for the filter, None where the curve has no such pair."""
-    try:
-        return filter_noise_of(result.fit)
-    except CalibrationError:
-        return None
+def drift_json(noise: FilterNoise, record: npt.NDArray[np.float64], rate: float) -> list[dict[str, Any]]:
+    """Drift of an axis without aiding, predicted and seen: 60 s at rest, then some seconds more, in unit s."""
+    return [
+        {"after_s": span, "predicted": drift_std(noise, span), "seen": seen_drift(record, rate, span)} for span in SPANS
+    ]
 
 
-def allan_axis_json(result: AllanResult, noise: FilterNoise | None) -> dict[str, Any]:
+def allan_axis_json(result: AllanResult, noise: FilterNoise, drift: list[dict[str, Any]]) -> dict[str, Any]:
     """One axis of the JSON object: the fit with its 95 % intervals, the raw readings with one sigma (relative)."""
     fit, minimum = result.fit, result.raw_minimum
     return {
@@ -144,5 +145,5 @@ def allan_axis_json(result: AllanResult, noise: FilterNoise | None) -> dict[str,
             "confidence": result.confidence.tolist(),
         },
         "consistent": fit.consistent,
-        "filter": asdict(noise) if noise is not None else None,
+        "filter": asdict(noise) | {"learnt_s": LEARNT, "drift": drift},
     }
