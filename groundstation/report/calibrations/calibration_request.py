@@ -39,6 +39,7 @@ class TurntableRequest:
     jig_deg: JigFigures = None
     temperature_c: float | None = None
     full_scale: float = NO_LIMIT
+    force: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +51,7 @@ class AttitudesRequest:
     jig_deg: JigFigures = None
     temperature_c: float | None = None
     full_scale: float = NO_LIMIT
+    force: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +63,7 @@ class MwdRequest:
     tool_face: bool = False
     jig_deg: JigFigures = None
     full_scale: float = NO_LIMIT
+    force: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +76,7 @@ class MagnetometerRequest:
     field_ut: float | None = None
     dip_deg: float | None = None
     full_scale: float = NO_LIMIT
+    force: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +131,23 @@ class AllanRequest:
     words: RecordWords = RecordWords()
 
 
+@dataclass(frozen=True, slots=True)
+class RestsRequest:
+    """An IMU laid down at attitudes that are not known; ``gravity`` (m/s^2) of the place."""
+
+    file: Path
+    gravity: float = STANDARD_GRAVITY
+    rate: float | None = None
+    force: bool = False
+    words: RecordWords = RecordWords()
+
+
 CalibrationRequest = (
-    TurntableRequest | AttitudesRequest | MwdRequest | MagnetometerRequest | QualityRequest | AllanRequest
+    TurntableRequest
+    | AttitudesRequest
+    | MwdRequest
+    | MagnetometerRequest
+    | QualityRequest
+    | AllanRequest
+    | RestsRequest
 )
