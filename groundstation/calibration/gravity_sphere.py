@@ -74,7 +74,7 @@ def fit_gravity_sphere(means: Array, gravity: float) -> GravityFit:
         left_out[~own] = _sizes(_solved(means[own], gravity)[0], means[~own]) - gravity
     variance = float(np.sum(residuals**2)) / max(len(means) - PARAMETERS, 1)
     cov = variance * np.linalg.inv(jacobian.T @ jacobian)
-    matrix = np.linalg.inv(_triangle(values))
+    matrix: Array = np.linalg.inv(_triangle(values)).astype(np.float64)
     std = np.zeros((3, 3))
     for k in range(6):  # dM = -M dK M
         unit = np.zeros((3, 3))

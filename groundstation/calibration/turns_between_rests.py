@@ -68,7 +68,7 @@ def fit_turns(rate: Array, period: float, rests: list[slice], gravity: Array) ->
     variance = float(misses @ misses) / max(2 * len(turns) - 9, 1)
     # a turn about gravity is in no miss: of what is left open the standard error is large, not zero
     cov = variance * np.linalg.pinv(jacobian.T @ jacobian)
-    matrix = np.linalg.inv(inverse)
+    matrix: Array = np.linalg.inv(inverse).astype(np.float64)
     std = np.zeros((3, 3))
     for k in range(9):
         unit = np.zeros(9)

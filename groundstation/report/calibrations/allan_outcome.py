@@ -42,7 +42,10 @@ def answer_allan(request: AllanRequest, day: str) -> CalibrationOutcome:
     noises = [fit_bias_model(result.tau, result.deviation, result.confidence) for result in curves]
     drifts = [drift_json(noise, found[part, k], rate) for k, noise in enumerate(noises)]
     count = part.stop - part.start
-    axes = {name: allan_axis_json(*of_axis) for name, *of_axis in zip(AXES, curves, noises, drifts, strict=True)}
+    axes = {
+        name: allan_axis_json(curve, noise, drift)
+        for name, curve, noise, drift in zip(AXES, curves, noises, drifts, strict=True)
+    }
     lines = [int(record.lines[part.start]), int(record.lines[part.stop - 1])]
     result = {
         "axes": axes,

@@ -13,7 +13,7 @@ from groundstation.calibration.attitudes import AttitudeFit, fit_attitudes, fit_
 from groundstation.calibration.block import Calibration, Provenance, to_json
 from groundstation.calibration.calibration_records import read_attitudes, read_turn_table
 from groundstation.calibration.coverage import COVERAGE
-from groundstation.calibration.gates import linear_gates, pass_gates
+from groundstation.calibration.landing_gates import linear_gates, pass_gates
 from groundstation.calibration.matrix_files import read_matrix
 from groundstation.calibration.temperature import Array
 from groundstation.calibration.turntable import SETTINGS, as_observations, correct_readings, turntable_alignment
@@ -76,7 +76,9 @@ def answer_turntable(request: TurntableRequest, day: str) -> CalibrationOutcome:
         design=f"turn table, two rotations about each axis at {request.reference:g} {request.unit}",
         record_sha256=record.sha256,
     )
-    return linear_outcome(gated(job, request), day, request.temperature_c, {"reference": request.reference})
+    return linear_outcome(
+        judged_calibration(job, request), day, request.temperature_c, {"reference": request.reference}
+    )
 
 
 def answer_attitudes(request: AttitudesRequest, day: str) -> CalibrationOutcome:
@@ -110,10 +112,10 @@ def answer_attitudes(request: AttitudesRequest, day: str) -> CalibrationOutcome:
         beside = [[None if math.isnan(v) else v for v in row] for row in (found.matrix - like).tolist()]
         extra = {"yaw_deg": math.degrees(found.yaw), "yaw_std_deg": math.degrees(found.yaw_std)}
         extra["reference_difference"] = beside
-    return linear_outcome(gated(job, request), day, request.temperature_c, extra)
+    return linear_outcome(judged_calibration(job, request), day, request.temperature_c, extra)
 
 
-def gated(job: LinearCalibration, request: TurntableRequest | AttitudesRequest) -> LinearCalibration:
+def judged_calibration(job: LinearCalibration, request: TurntableRequest | AttitudesRequest) -> LinearCalibration:
     """The calibration with what its gates found.
 
     Raises

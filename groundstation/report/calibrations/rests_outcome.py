@@ -10,8 +10,8 @@ from typing import Any, Final
 import numpy as np
 
 from groundstation.calibration.block import Array, Calibration, Provenance, to_json
-from groundstation.calibration.gates import LARGEST_RESIDUAL, Gate, pass_gates
 from groundstation.calibration.gravity_sphere import GravityFit, fit_gravity_sphere
+from groundstation.calibration.landing_gates import LARGEST_RESIDUAL, Gate, pass_gates
 from groundstation.calibration.rest_finder import find_rests
 from groundstation.calibration.turns_between_rests import TurnsFit, fit_turns
 from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome, naming_file

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.calibration.gates import Gate, face_gate, pass_gates, rows_twice, triad_gates
 from groundstation.calibration.jig import Jig
+from groundstation.calibration.landing_gates import Gate, face_gate, pass_gates, rows_twice, triad_gates
 from groundstation.calibration.mwd_block import of_fit, to_json
 from groundstation.calibration.mwd_files import MwdRecord, read_mwd
 from groundstation.calibration.mwd_model import (
