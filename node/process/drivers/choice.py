@@ -1,10 +1,11 @@
-"""A source by its name on the command line: ``replay:FILE``, ``timed:FILE``, ``mpu6500:1``, ``counter:FILE``."""
+"""A source by its name on the command line, as ``timed:FILE``, ``iio:icm42688``, ``mpu6500:1``, ``counter:FILE``."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from node.errors import NodeConfigurationError
+from node.process.drivers.iio_imu import IioImu
 from node.process.drivers.mpu6500 import ADDRESS, Mpu6500, open_bus
 from node.process.drivers.quadrature import QuadratureFile
 from node.process.drivers.replay_drivers import ReplayEncoder, ReplayImu
@@ -13,7 +14,7 @@ from node.process.drivers.timed import TimedEncoder, TimedImu
 from telemetry.errors import RecordError
 from telemetry.records.record_reading import RecordReading, read_told
 
-IMU_FORMS = "replay:FILE, timed:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS"
+IMU_FORMS = "replay:FILE, timed:FILE, iio:NAME, mpu6500:BUS or mpu6500:BUS:ADDRESS"
 COUNTER_FORMS = "replay:FILE, timed:FILE or counter:FILE"
 LARGEST_BUS = 255
 ADDRESSES = (0x68, 0x69)
@@ -32,6 +33,8 @@ def imu_source(text: str) -> ImuSource:
         return ReplayImu(*told_recording("imu", rest))
     if kind == "timed" and rest:
         return TimedImu(*told_recording("imu", rest))
+    if kind == "iio" and rest:
+        return IioImu(rest)
     if kind == "mpu6500":
         bus, _, address = rest.partition(":")
         try:
