@@ -6,6 +6,8 @@ import click
 
 from borechain.cli.calibrate.linear import attitudes, turntable
 from borechain.cli.calibrate.mwd import magnetometer, mwd, qc
+from borechain.cli.calibrate.record_reader import record_reader
+from borechain.cli.calibrate.rests_command import rests
 
 
 @click.group()
@@ -23,5 +25,5 @@ def calibrate() -> None:
     """
 
 
-for command in (turntable, attitudes, mwd, magnetometer, qc):
+for command in (turntable, attitudes, mwd, magnetometer, qc, record_reader, rests):
     calibrate.add_command(command)
