@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from groundstation.survey.tools.formulas import ARRAY, VARIABLES, compile_formulas, is_zero
-from groundstation.survey.tools.instruments import ACROSS, ZERO, SurveyTool, Term
+from groundstation.survey.tools.instruments import COMPANION, ZERO, SurveyTool, Term
 
 FADED_DEG = 0.1  # inclination from which on a lean has its direction
 FADE = f"Max(0, 1 - (Min(Inc, pi - Inc) / ({FADED_DEG} * rad))^2) / Sin(Inc)"
@@ -23,7 +23,9 @@ UPRIGHT = 1e-30  # rad
 def with_across_terms(tool: SurveyTool) -> SurveyTool:
     """The tool with a companion for every term that leans a vertical hole in one direction alone."""
     known = {term.name for term in tool.terms}
-    more = [_across(term) for term in tool.terms if _leans_one_way(tool, term) and f"{term.name}{ACROSS}" not in known]
+    more = [
+        _across(term) for term in tool.terms if _leans_one_way(tool, term) and f"{term.name}{COMPANION}" not in known
+    ]
     return tool.with_terms((*tool.terms, *more)) if more else tool
 
 
@@ -41,4 +43,4 @@ def _leans_one_way(tool: SurveyTool, term: Term) -> bool:
 def _across(term: Term) -> Term:
     """The companion of a term; a vertical hole counts as leaning north."""
     weights = ("0", "0", f"({term.weights[1]}) * {FADE}")
-    return replace(term, name=f"{term.name}{ACROSS}", weights=weights, singular=(ZERO[0], term.weights[1], ZERO[2]))
+    return replace(term, name=f"{term.name}{COMPANION}", weights=weights, singular=(ZERO[0], term.weights[1], ZERO[2]))

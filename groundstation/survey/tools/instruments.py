@@ -33,7 +33,7 @@ LARGEST = 1e300
 ZERO: Triple = ("0", "0", "0")
 Window = tuple[float, float]
 EVERYWHERE: Window = (-math.inf, math.inf)
-ACROSS = "-ACROSS"  # ends the name of a companion in a vertical hole: ``across_vertical``
+COMPANION = "-COMPANION"  # ends the name of a companion in a vertical hole: ``across_vertical``
 PREVIOUS = "previous"  # the azimuth weight of the station before, of drift and random walk
 
 
@@ -130,7 +130,7 @@ class SurveyTool:
 
     def without(self, *names: str) -> SurveyTool:
         """Return the tool less the terms of these names and their companions."""
-        return self.with_terms(tuple(term for term in self.terms if term.name.removesuffix(ACROSS) not in names))
+        return self.with_terms(tuple(term for term in self.terms if term.name.removesuffix(COMPANION) not in names))
 
     def with_terms(self, terms: tuple[Term, ...]) -> SurveyTool:
         """Return the tool with ``terms`` in place of its own."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.formulas import is_zero
-from groundstation.survey.tools.instruments import ACROSS, PropagationMode, SurveyTool, Term
+from groundstation.survey.tools.instruments import COMPANION, PropagationMode, SurveyTool, Term
 from groundstation.survey.well.compiled_model import locate_stations
 from groundstation.survey.well.error_propagation import Uncertainty
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
@@ -225,7 +225,7 @@ def with_azimuth_error(tool: SurveyTool, azimuth_error: float) -> SurveyTool:
 
 def _turns_azimuth_alone(term: Term) -> bool:
     depth, inclination, azimuth = term.weights
-    companion = term.name.endswith(ACROSS)  # that of an inclination
+    companion = term.name.endswith(COMPANION)  # that of an inclination
     return not companion and term.position is None and is_zero(depth) and is_zero(inclination) and not is_zero(azimuth)
 
 

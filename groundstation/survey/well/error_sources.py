@@ -85,7 +85,7 @@ def inputs_of(tool: SurveyTool, site: Site, values: Mapping[str, Any]) -> list[A
 
 
 def leaning_azimuth(survey: WellSurvey) -> Array:
-    """Azimuths (..., n) that errors are weighted by, rad: where the hole is vertical it has none, and true north counts.
+    """Azimuths (..., n) that errors are weighted by, rad: true north where the hole is vertical and has none.
 
     The industry's own wells say 0 there. Whatever else a file says would turn the errors of one station against those
     of the next, and what has no meaning would make a hole look better known.
