@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from borechain.cli.console_tables import table_console
+from borechain.cli.console_tables import show_warnings, table_console
 from borechain.cli.faults import plain_faults
 from borechain.cli.shared_options import json_option
 from borechain.cli.survey.survey_options import SurveyFiles, survey_options
@@ -76,6 +76,7 @@ def show_survey(result: dict[str, Any]) -> None:
 
     paper = table_console(110)
     paper.print(result["read_as"], markup=False)
+    show_warnings(paper, result["warnings"])
     words = (
         result["method"],
         result["instrument"],

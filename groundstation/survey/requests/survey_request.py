@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from groundstation.entry.quantity_ranges import RANGES
+
 if TYPE_CHECKING:
     from groundstation.survey.well.error_sources import Site
 
@@ -25,7 +27,15 @@ class SiteFigures:
     latitude_deg: float = 52.0
 
     def to_site(self) -> Site:
-        """The place in SI and rad."""
+        """The place in SI and rad.
+
+        Raises
+        ------
+        SurveyError
+            Names the option that is beyond its range.
+        """
+        for name in ("gravity", "field_nt", "dip_deg", "declination_deg", "latitude_deg"):
+            RANGES[name].check(f"--{name.replace('_', '-')}", getattr(self, name))
         from groundstation.survey.well.error_sources import Site
 
         dip, declination, latitude = map(math.radians, (self.dip_deg, self.declination_deg, self.latitude_deg))
@@ -62,6 +72,8 @@ class SurveyRequest:
     displacement_rule: str = "exact"
     from_collar: bool = False
     md_unit: str | None = None
+    hole: str | None = None  # of a table of several
+    decimal: str | None = None  # ``comma`` or ``point``, where a table may be read as either
     md: tuple[float, ...] = ()  # m, depths at which the position is asked too
     tie_on: Path | None = None
     programme: Path | None = None

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.entry.entry_warning import warning_rows
 from groundstation.survey.requests.survey_rows import COORDINATES
 from groundstation.survey.wall.column_deviation import point_deviation
 from groundstation.survey.wall.column_joint import shift_margin
@@ -37,6 +38,7 @@ def wall_result(found: Wall, judgement: Judgement) -> dict[str, Any]:
         "read_from": {"depth_reference": found.file.depths_read_from, "height_m": found.file.reference_height},
         "height_datum": found.file.height_datum or None,
         "coordinates_north": None if found.file.grid is None else found.file.grid.north,
+        "warnings": warning_rows(found.warnings),
         "findings": [finding_row(finding) for finding in judgement.findings],
         "probability_of_any": judgement.system.probability,
         "probability_of_any_standard_error": judgement.system.standard_error,

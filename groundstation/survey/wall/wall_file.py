@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.entry_warning import EntryWarning
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
 from groundstation.survey.wall.as_built import Columns
@@ -28,6 +29,7 @@ from groundstation.survey.wall.wall_columns import BuiltWall, build_wall
 from groundstation.survey.wall.wall_frames import FRAMES, NORTH_ANGLES, ORIGIN, PLACE, grid_of, norths_of, place_of
 from groundstation.survey.wall.wall_joints import Detour, neighbours_in_grid, neighbours_in_line
 from groundstation.survey.wall.wall_layers import MOST_RADIUS_CV, layers_of
+from groundstation.survey.wall.wall_plausibility import wall_warnings
 from groundstation.survey.wall.wall_stations import read_holes
 from groundstation.survey.wall.wall_tables import STRAIGHT, Defaults, Remedy, read_course, read_heads
 from groundstation.survey.well.depth_reference import DEPTHS_FROM
@@ -129,6 +131,7 @@ class Wall:
     detours: list[Detour]
     holes: list[ColumnSurvey]
     drilled_on: list[date | None]  # of every column
+    warnings: tuple[EntryWarning, ...] = ()
 
     @property
     def columns(self) -> Columns:
@@ -297,7 +300,8 @@ def read_wall(path: Path) -> Wall:
     pairs = _pairs(file, [row.remedy for row in rows], built)
     detours = _detours(file.heads, names, [row.remedy for row in rows], pairs)
     _check_design(file, plans, built, pairs, {detour.joint for detour in detours})
-    return Wall(file, plans, built, pairs, detours, holes, [row.drilled_on for row in rows])
+    days = [row.drilled_on for row in rows]
+    return Wall(file, plans, built, pairs, detours, holes, days, wall_warnings(plans, holes, pairs))
 
 
 def _pairs(file: WallFile, remedies: list[Remedy], built: BuiltWall) -> npt.NDArray[np.intp]:

@@ -184,7 +184,9 @@ def _tied(record: SurveyRecord, tie_on: TieOn) -> SurveyRecord:
     columns = {name: np.concatenate([values[:1], values[keep]]) for name, values in record.columns.items()}
     if len(md) < 2:
         raise SurveyError(f"tie-on: expected a station below {tie_on.md:g} m, got none")
-    return SurveyRecord(md, inclination, azimuth, [0, *record.lines[keep]], columns, record.of_displacements)
+    return SurveyRecord(
+        md, inclination, azimuth, [0, *record.lines[keep]], columns, record.of_displacements, record.warnings
+    )
 
 
 def legs_of(parts: Sequence[Stretch], md: Array) -> list[Leg]:
