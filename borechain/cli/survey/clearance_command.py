@@ -103,6 +103,8 @@ def show_clearance(result: dict[str, Any], title: str) -> None:
     """Factors of every station and the verdict, for people."""
     from rich.table import Table
 
+    from groundstation.survey.requests.site_place import site_words
+
     paper = table_console(100)
     table = Table(title=f"Clearance of {title}, true north, depths from their heads")
     for name in ("MD m", "offset MD m", "distance m", "sigma m", "factor", "as if nothing is shared"):
@@ -111,6 +113,7 @@ def show_clearance(result: dict[str, Any], title: str) -> None:
         table.add_row(*(f"{value:.3f}" for value in row.values()))
     paper.print(table)
     show_warnings(paper, result["warnings"])
+    paper.print(site_words(result["site"]), markup=False)
     verdict = "clear" if result["clear"] else "TOO NEAR"
     least, nearest = result["least"], result["nearest"]
     decides = min(least["factor"], least["independent_factor"])

@@ -21,7 +21,7 @@ def decimal_sign(path: Path, cells: Sequence[str], separator: str, asked: str | 
     Raises
     ------
     SurveyError
-        When a comma may be either and nobody said which.
+        When a comma may be either and it is not said which.
     """
     commas, points = [c for c in cells if "," in c], [c for c in cells if "." in c]
     if asked is not None:

@@ -40,7 +40,7 @@ BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
 
 @dataclass(frozen=True, slots=True)
 class NamedColumn:
-    """A column whose meaning is known; ``unknown`` is the unit that it has and that is none."""
+    """A column whose meaning is known; ``unknown`` is its unit where that is not known."""
 
     quantity: str
     place: int

@@ -64,7 +64,7 @@ def read_table_columns(
                 raise
             continue
         for line, value in zip(table.lines, values, strict=True):
-            if name in names and value is not None and not math.isfinite(value):
+            if name in OWN.values() and value is not None and not math.isfinite(value):
                 raise SurveyError(f"{path}: line {line}: expected a finite {name}, got {value}")
         found[name] = scale * np.array([_value(name, value) for value in values])
     return found, table.lines

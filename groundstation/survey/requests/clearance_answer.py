@@ -17,6 +17,9 @@ from groundstation.survey.files.field_files import read_any
 from groundstation.survey.files.field_table import TableWish
 from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.requests.clearance_request import ClearanceRequest
+from groundstation.survey.requests.site_place import known_site
+from groundstation.survey.requests.survey_answer import magnetic_needs
+from groundstation.survey.requests.survey_request import FrameRequest
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.well.analysis import record_variables
 from groundstation.survey.well.clearance import Clearance, ClearanceHole, Rule, Separations, clearance_between
@@ -70,9 +73,12 @@ def answer_clearance(request: ClearanceRequest) -> dict[str, Any]:
         replace(hole, wander=_wander(request, described.instrument))
         for hole, described in zip(holes, (mine, theirs), strict=True)
     ]
-    found = clearance_between(holes[0], holes[1], request.site.to_site(), rule)
+    needs = magnetic_needs([leg.tool for hole in holes for leg in hole.legs])
+    known = known_site(request.site, FrameRequest(), needs)
+    found = clearance_between(holes[0], holes[1], known.figures.to_site(), rule)
     warnings = [*_warnings(mine), *_warnings(theirs)]
-    return clearance_result(found, request.from_m) | {"warnings": warning_rows(tuple(warnings))}
+    more = {"site": known.row(), "warnings": warning_rows(tuple(warnings))}
+    return clearance_result(found, request.from_m) | more
 
 
 def _record(path: Path, hole: str | None) -> SurveyRecord:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,6 +17,7 @@ from groundstation.survey.files.field_table import TableWish
 from groundstation.survey.files.programme import read_programme, read_tie_on
 from groundstation.survey.files.station_tables import Understood
 from groundstation.survey.files.survey_records import DisplacementRule, with_collar
+from groundstation.survey.requests.site_place import MAGNETIC, known_site
 from groundstation.survey.requests.survey_request import PROGRAMME_ALONE, FrameRequest, SurveyRequest
 from groundstation.survey.requests.survey_rows import source_rows, station_at_depth, station_rows
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
@@ -76,9 +78,18 @@ def answer_survey(request: SurveyRequest) -> SurveyAnswer:
     if request.azimuth_error_deg is not None:
         tool = with_azimuth_error(tool, math.radians(request.azimuth_error_deg))
     legs = [] if request.programme is None else read_programme(request.programme)
+    tools = [leg.tool for leg in legs] or [tool]
+    known = known_site(request.site, request.frame, magnetic_needs(tools))
+    request = replace(request, site=known.figures, frame=known.frame)
     found = analyse_record(record, legs or tool, request)
     instrument = ", ".join(f"{leg.tool.name} from {leg.top:g} m" for leg in legs) or tool.name
-    return SurveyAnswer(request, record, tool, instrument, found, survey_result(request, understood, instrument, found))
+    result = survey_result(request, understood, instrument, found) | {"site": known.row()}
+    return SurveyAnswer(request, record, tool, instrument, found, result)
+
+
+def magnetic_needs(tools: Sequence[SurveyTool]) -> set[str]:
+    """Figures of the magnetic field that instruments ask for."""
+    return {name for name, variable in MAGNETIC.items() if any(tool.asks_for(variable) for tool in tools)}
 
 
 def _as_said(request: SurveyRequest, understood: Understood) -> SurveyRequest:
@@ -122,7 +133,7 @@ def analyse_record(record: SurveyRecord, tool: SurveyTool | list[Stretch], reque
 
 def reference_frame(asked: FrameRequest) -> ReferenceFrame:
     """Norths and depth references of the record and of the answer."""
-    angles = (asked.north_of_site_deg or 0.0, asked.convergence_deg or 0.0, asked.declination_deg)
+    angles = (asked.north_of_site_deg or 0.0, asked.convergence_deg or 0.0, asked.declination_deg or 0.0)
     for name, angle in zip(("north_of_site_deg", "convergence_deg", "declination_deg"), angles, strict=True):
         RANGES[name].check(f"--{name.replace('_', '-')}", angle)
     norths = Norths(*map(math.radians, angles))

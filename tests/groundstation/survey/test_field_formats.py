@@ -51,14 +51,12 @@ def test_a_wbp_file_of_another_program_is_the_same_well(tmp_path: Path) -> None:
 
 
 def wbp_text() -> str:
-    """The file as the library that reads it writes it."""
-    from welleng.exchange import wbp
-    from welleng.survey import Survey
-
-    md, inc, azi = (np.array(column) for column in zip(*ROWS, strict=True))
-    plan = wbp.WellPlan(survey=Survey(md, inc, azi), plan_name="7", location_type="unknown")
-    lines = wbp.export([plan])
-    return lines if isinstance(lines, str) else "\n".join(lines)
+    """Turn points as the format has them: depth, azimuth, inclination, rates, tool face, method; then their place."""
+    points = "".join(
+        f"P: {md:7.2f} {azi:7.3f} {inc:7.3f}   0.000   0.000   0.000   0.000    2\nL: 0.00 0.00 0.00\n"
+        for md, inc, azi in ROWS
+    )
+    return f"DEPTH 2\n! by hand\nTARGETS:\nWELLPLANS:\n{'W:0200   0 123         7':144s}{3.0:7.2f}{0.0:8.5f}\n{points}"
 
 
 def test_our_own_table_of_stations_is_read(tmp_path: Path) -> None:
