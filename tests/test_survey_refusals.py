@@ -16,7 +16,7 @@ CLOSE = (  # the same hole, a station every 20 m
 )
 DEEP = "MD (m),Inc,Azi\n500,30,40\n600,31,41\n"
 TIE = "md_m = 500\ninclination_deg = 33\nazimuth_deg = 40\nnorth_m = 90\neast_m = 75\ntvd_m = 470\n"
-GAP = '[[leg]]\nfrom_m = 0\nto_m = 400\ninstrument = "mwd-rev5.1"\n[[leg]]\nfrom_m = 550\ninstrument = "relay"\n'
+GAP = '[[leg]]\nfrom_m = 0\nto_m = 400\ninstrument = "gyro-continuous"\n[[leg]]\nfrom_m = 550\ninstrument = "relay"\n'
 ROLL = (
     '[tool]\nname = "t"\ntitle = "t"\n'
     '[[term]]\nname = "A"\nvalue = 1.0\nunit = "deg"\nmode = "systematic"\nazimuth = "Sin(Roll)"\n'

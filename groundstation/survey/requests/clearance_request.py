@@ -21,6 +21,8 @@ class ClearanceRequest:
     offset_radius_m: float = 0.0
     offset_head: tuple[float, float, float] = (0.0, 0.0, 0.0)  # north, east, down from the reference hole's
     from_m: float | None = None  # of a sidetrack: measured depth down to which the two are one hole
+    hole: str | None = None  # of a table of several, of the reference
+    offset_hole: str | None = None
     k: float = 3.5  # of the rule
     sigma_ahead_m: float = 0.5
     margin_m: float = 0.3

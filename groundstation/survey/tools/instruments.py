@@ -33,6 +33,7 @@ LARGEST = 1e300
 ZERO: Triple = ("0", "0", "0")
 Window = tuple[float, float]
 EVERYWHERE: Window = (-math.inf, math.inf)
+COMPANION = "-COMPANION"  # ends the name of a companion in a vertical hole: ``across_vertical``
 PREVIOUS = "previous"  # the azimuth weight of the station before, of drift and random walk
 
 
@@ -128,8 +129,8 @@ class SurveyTool:
         return variable.lower() in text
 
     def without(self, *names: str) -> SurveyTool:
-        """Return the tool less the terms of these names."""
-        return self.with_terms(tuple(term for term in self.terms if term.name not in names))
+        """Return the tool less the terms of these names and their companions."""
+        return self.with_terms(tuple(term for term in self.terms if term.name.removesuffix(COMPANION) not in names))
 
     def with_terms(self, terms: tuple[Term, ...]) -> SurveyTool:
         """Return the tool with ``terms`` in place of its own."""
@@ -145,13 +146,23 @@ def shipped_tool_names() -> list[str]:
 def load_tool(name_or_file: str, parameters: Mapping[str, float] | None = None) -> SurveyTool:
     """Tool by its name, of the OWSG set by its name there, or of a TOML or ISCWSA JSON file.
 
-    ``parameters`` are those that it leaves out, or in place of its own.
+    ``parameters`` are those that it leaves out, or in place of its own. Terms that lean a vertical hole one way have
+    a companion across (``across_vertical``), but in the industry's own models.
 
     Raises
     ------
     ToolError
         One line: file, term, what was expected and what came.
     """
+    from groundstation.survey.tools.across_vertical import with_across_terms
+
+    tool = _read_tool(name_or_file, parameters)
+    # the industry's own stay exact to its tables
+    return tool if tool.slot_allowance else with_across_terms(tool)
+
+
+def _read_tool(name_or_file: str, parameters: Mapping[str, float] | None) -> SurveyTool:
+    """The tool as it is published; errors as ``load_tool``."""
     if name_or_file in shipped_tool_names():
         text = (resources.files("groundstation.survey.tools") / "models" / f"{name_or_file}.toml").read_text("utf-8")
         return parse_toml(text, name_or_file, parameters)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 import tomllib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.entry_warning import EntryWarning
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
 from groundstation.survey.wall.as_built import Columns
@@ -25,9 +26,19 @@ from groundstation.survey.wall.column_joint import largest_distance
 from groundstation.survey.wall.column_plans import Assumptions, ColumnPlan, ColumnSurvey
 from groundstation.survey.wall.tight_depths import TightRange, asked_depths, check_reach, tight_depths
 from groundstation.survey.wall.wall_columns import BuiltWall, build_wall
-from groundstation.survey.wall.wall_frames import FRAMES, NORTH_ANGLES, ORIGIN, PLACE, grid_of, norths_of, place_of
+from groundstation.survey.wall.wall_frames import (
+    FRAMES,
+    NORTH_ANGLES,
+    ORIGIN,
+    PLACE,
+    check_magnetic_site,
+    grid_of,
+    norths_of,
+    place_of,
+)
 from groundstation.survey.wall.wall_joints import Detour, neighbours_in_grid, neighbours_in_line
 from groundstation.survey.wall.wall_layers import MOST_RADIUS_CV, layers_of
+from groundstation.survey.wall.wall_plausibility import wall_warnings
 from groundstation.survey.wall.wall_stations import read_holes
 from groundstation.survey.wall.wall_tables import STRAIGHT, Defaults, Remedy, read_course, read_heads
 from groundstation.survey.well.depth_reference import DEPTHS_FROM
@@ -104,6 +115,7 @@ class WallFile:
     grid: SiteGrid | None = None  # site coordinates of positions from the wall's zero
     course: PlanSettings | None = None  # of columns that state no axis of their own
     courses: tuple[Path, ...] = ()  # files of plans
+    stated: dict[str, Any] = field(default_factory=dict)  # figures of the site
 
     def digests(self) -> list[tuple[str, str]]:
         """Name and SHA-256 of each file as it is now."""
@@ -131,6 +143,7 @@ class Wall:
     detours: list[Detour]
     holes: list[ColumnSurvey]
     drilled_on: list[date | None]  # of every column
+    warnings: tuple[EntryWarning, ...] = ()
 
     @property
     def columns(self) -> Columns:
@@ -195,7 +208,7 @@ def read_wall_file(path: Path) -> WallFile:
     north, stations_north = norths_of(path, values)
     assumed = Assumptions(
         method,
-        place_of(values),
+        place_of(path, values),
         north,
         values.get("unsurveyed_percent", 1.0) / 100.0,
         values.get("depth_step_m", 0.5),
@@ -235,6 +248,7 @@ def read_wall_file(path: Path) -> WallFile:
         grid_of(path, values, north),
         _course(path, values),
         (path.parent / values["plan"],) if "plan" in values else (),
+        {key: values[key] for key in ("gravity_mps2", "field_nt", "declination_deg", *PLACE) if key in values},
     )
 
 
@@ -294,6 +308,7 @@ def read_wall(path: Path) -> Wall:
             f"{path}: length_m is missing; no column was surveyed, so nothing says how deep they are to go"
         )
     plans = [row.plan(length) for row in rows]
+    check_magnetic_site(path, file.stated, {id(plan.tool): plan.tool for plan in plans}.values())
     try:
         built = build_wall(plans, holes, file.assumed)
     except SurveyError as error:
@@ -301,7 +316,8 @@ def read_wall(path: Path) -> Wall:
     pairs = _pairs(file, [row.remedy for row in rows], built)
     detours = _detours(file.heads, names, [row.remedy for row in rows], pairs)
     _check_design(file, plans, built, pairs, {detour.joint for detour in detours})
-    return Wall(file, plans, built, pairs, detours, holes, [row.drilled_on for row in rows])
+    days = [row.drilled_on for row in rows]
+    return Wall(file, plans, built, pairs, detours, holes, days, wall_warnings(plans, holes, pairs))
 
 
 def _pairs(file: WallFile, remedies: list[Remedy], built: BuiltWall) -> npt.NDArray[np.intp]:

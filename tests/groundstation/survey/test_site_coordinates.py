@@ -107,6 +107,8 @@ inclination_deg = 12
 azimuth_deg = 77
 length_m = 12
 instrument = "mwd-rev5.1"
+field_nt = 50000
+dip_deg = 70
 """
 
 
@@ -120,6 +122,8 @@ def wall(folder: Path, north: str, stations_north: str, more: str = "") -> Path:
     ]
     (folder / "stations.csv").write_text("column,md_m,inclination_deg,azimuth_deg\n" + "\n".join(rows) + "\n")
     path = folder / "wall.toml"
+    if "declination_deg" not in more and "magnetic" not in (north, stations_north):
+        more += "declination_deg = 0\n"  # what a magnetic instrument is not without
     path.write_text(f'{WALL}north = "{north}"\nstations_north = "{stations_north}"\n{more}')
     return path
 
