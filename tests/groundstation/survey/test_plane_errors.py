@@ -9,15 +9,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.survey.tools.instruments import load_tool
+from groundstation.survey.tools.instruments import PropagationMode, load_tool
 from groundstation.survey.wall.column_deviation import ColumnDesign
-from groundstation.survey.wall.column_errors import reduce_error_columns
+from groundstation.survey.wall.column_errors import reduce_error_columns, shared_name
 from groundstation.survey.wall.column_plans import Assumptions, ColumnPlan, ColumnSurvey
 from groundstation.survey.wall.judged_wall import judge_wall
 from groundstation.survey.wall.plane_errors import PlaneErrors
 from groundstation.survey.wall.wall_columns import build_wall
 from groundstation.survey.wall.wall_errors import COLUMNS, PLACES, batch_groups
 from groundstation.survey.wall.wall_file import read_wall
+from groundstation.survey.well.error_columns import ErrorColumns
 
 
 @given(st.integers(0, 10_000), st.integers(2, 8), st.integers(0, 40))
@@ -102,3 +103,20 @@ def test_a_wall_of_four_times_as_many_columns_needs_not_four_times_the_memory(tm
         tracemalloc.stop()
         assert 0.0 < judgement.system.probability < 1.0
     assert peaks[1] < 3.0 * peaks[0]
+
+
+@pytest.mark.parametrize(
+    ("mode", "shared_as"),
+    [
+        (PropagationMode.RANDOM, None),
+        (PropagationMode.SECTION, None),  # of one run of a gyro, which surveys one column
+        (PropagationMode.SYSTEMATIC, "7/A"),
+        (PropagationMode.WELL, "7/A"),
+        (PropagationMode.GLOBAL, "A"),
+    ],
+)
+def test_columns_share_what_one_instrument_errs_in_all_of_them(mode: PropagationMode, shared_as: str | None) -> None:
+    source = ErrorColumns("A", mode, np.zeros((1, 2, 3, 1)))
+    assert shared_name(source, ColumnPlan(ColumnDesign(), load_tool("relay"), serial="7")) == shared_as
+    alone = shared_name(source, ColumnPlan(ColumnDesign(), load_tool("relay")))
+    assert alone == (shared_as if mode is PropagationMode.GLOBAL else None)
