@@ -14,6 +14,9 @@ from scipy.spatial import cKDTree
 
 from groundstation.errors import SurveyError
 from groundstation.survey.path.leg_wander import LegWander
+from groundstation.survey.requests.clearance_answer import answer_clearance
+from groundstation.survey.requests.clearance_request import ClearanceRequest
+from groundstation.survey.requests.survey_request import SiteFigures
 from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, Term, load_tool
 from groundstation.survey.well.clearance import ClearanceHole, HolePair, Rule, clearance_between
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
@@ -95,6 +98,52 @@ def test_the_printed_sidetrack_has_its_kick_off_station_misaligned_in_one_of_its
     assert 0.015 < float(departures[0].max()) < 0.02
     assert float(departures[1].max()) < 6e-3
     assert float(np.sqrt(np.mean(departures[1] ** 2))) < 0.3 * float(np.sqrt(np.mean(departures[0] ** 2)))
+
+
+def recorded(path: Path, parts: list[tuple[str, slice]]) -> Path:
+    """A record of stations of wells of the set, one part below the other."""
+    rows = [row for name, some in parts for row in zip(*angles_of(published(name)[0].survey, some), strict=True)]
+    path.write_text("md_m,inclination_deg,azimuth_deg\n" + "".join(f"{m!r},{i!r},{a!r}\n" for m, i, a in rows))
+    return path
+
+
+def angles_of(survey: WellSurvey, some: slice) -> list[list[float]]:
+    return [survey.md[some].tolist(), *((one[some] / DEG).tolist() for one in (survey.inclination, survey.azimuth))]
+
+
+@pytest.mark.parametrize("begins_at_kick_off", [True, False])
+def test_a_sidetrack_in_files_is_compared_from_where_it_leaves_the_hole(
+    tmp_path: Path, begins_at_kick_off: bool
+) -> None:
+    above = [] if begins_at_kick_off else [("reference", slice(0, KICK_OFF))]
+    request = ClearanceRequest(
+        recorded(tmp_path / "whole.csv", [("reference", slice(None))]),
+        recorded(tmp_path / "side.csv", [*above, ("10", slice(None))]),
+        instrument="mwd-rev4", radius_m=RADII["reference"], offset_radius_m=0.3048, from_m=900.0,
+        site=SiteFigures(9.80665, 50_000.0, 70.0, 0.0, 60.0),
+    )  # fmt: skip
+    found, expected = answer_clearance(request), published("10")[1]
+    factors = [row["independent_factor"] for row in found["stations"]]
+    assert found["stations"][0]["md_m"] == 900.0
+    np.testing.assert_allclose(factors, expected, rtol=2e-2, atol=2e-3)
+
+
+@pytest.mark.parametrize("forgotten_m", [5.0, 20.0])
+def test_each_path_wanders_as_its_own_instrument_leaves_it(tmp_path: Path, forgotten_m: float) -> None:
+    """Of ``relay`` it is counted and of the industry's models not, whichever of the two holes they surveyed."""
+    record = tmp_path / "hole.csv"
+    record.write_text("md_m,inclination_deg,azimuth_deg\n" + "".join(f"{md},2,30\n" for md in range(0, 121, 10)))
+    own = HoleWander(10.0 * np.arange(13.0), LegWander(0.3 * DEG, forgotten_m)).variances(np.array([11]), np.ones(1))[0]
+    for mine, theirs, times in (("relay", "mwd-rev4", 1), ("mwd-rev4", "relay", 1), ("relay", "relay", 2)):
+        request = ClearanceRequest(
+            record, record, instrument=mine, offset_instrument=theirs, offset_head=(0.0, 9.0, 0.0),
+            curvature_length_m=forgotten_m,
+        )  # fmt: skip
+        moved, still = (
+            answer_clearance(one)["stations"][-1]["sigma_m"] ** 2
+            for one in (request, replace(request, curvature_sigma_deg_per_m=0.0))
+        )
+        assert moved - still == pytest.approx(times * own, rel=0.01)
 
 
 @pytest.mark.parametrize("course", [30.0, 100.0])
@@ -189,6 +238,26 @@ def test_parallel_holes_of_one_instrument_err_alike_and_of_two_do_not() -> None:
         (5.0 - 1.0 - 0.3) / (3.5 * math.hypot(apart.stations.sigma[-1], 0.5))
     )
     assert alike.stations.independent_factor[-1] == pytest.approx(apart.stations.factor[-1])
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
+def test_what_errs_alike_along_a_bent_hole_bows_its_legs_as_it_turns_them(share: float) -> None:
+    """An azimuth that is off all along turns the whole hole about the vertical, and so every point of its arcs.
+
+    Against the line between the two ends of a leg, which the stations below the first tell.
+    """
+    tool = SurveyTool("t", "t", (Term("A", 1.0, "deg", PropagationMode.SYSTEMATIC, ("0", "0", "1")),))
+    md, inclination = 10.0 * np.arange(6), 0.2 * np.arange(6)
+    places = station_positions(Method.MINIMUM_CURVATURE, md, inclination, np.full(6, 0.7))
+    survey = WellSurvey(md, inclination, np.full(6, 0.7), places[:, 2])
+    hole = ClearanceHole(survey, places, (Leg(tool),), 0.1)
+    pair, errors, legs = HolePair(hole, hole, SITE, Rule()), leg_errors(survey, hole.legs, SITE), np.arange(1, 5)
+    ends = errors.effect(("A", PropagationMode.SYSTEMATIC), legs, np.zeros(4)) * (1.0 - share)
+    ends += errors.effect(("A", PropagationMode.SYSTEMATIC), legs, np.ones(4)) * share
+    bowed = errors.effect(("A", PropagationMode.SYSTEMATIC), legs, np.full(4, share)) - ends
+    arc = pair.mine.places(legs, np.full(4, share)) - (1.0 - share) * places[1:-1] - share * places[2:]
+    turned = 1.0 * DEG * np.cross([0.0, 0.0, 1.0], arc)
+    np.testing.assert_allclose(bowed, turned, rtol=0.03, atol=1e-6)
 
 
 def test_holes_against_each_other_err_against_each_other() -> None:
