@@ -12,6 +12,7 @@ import numpy.typing as npt
 from groundstation.errors import SurveyError
 from groundstation.survey.files.field_files import read_any
 from groundstation.survey.path.leg_wander import LegWander
+from groundstation.survey.path.stated_curvature import STATED_CURVATURE_DEG
 from groundstation.survey.requests.clearance_request import ClearanceRequest
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.well.analysis import record_variables
@@ -22,7 +23,6 @@ from groundstation.survey.well.reference_frames import SAME_DEPTH
 from groundstation.survey.well.well_record import SurveyRecord
 
 Array = npt.NDArray[np.float64]
-RELAY_CURVATURE_DEG = 0.3  # deg/m, as a ground station has it while it drills
 SAME_PLACE = 0.1  # m, of two records of one hole
 
 
@@ -72,7 +72,7 @@ def _wander(request: ClearanceRequest, instrument: str) -> LegWander:
     """Curvature of a path that an instrument surveyed."""
     std = request.curvature_sigma_deg_per_m
     if std is None:
-        std = RELAY_CURVATURE_DEG if instrument == "relay" else 0.0
+        std = STATED_CURVATURE_DEG if instrument == "relay" else 0.0
     return LegWander(math.radians(std), request.curvature_length_m)
 
 
