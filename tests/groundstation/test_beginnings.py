@@ -3,15 +3,16 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from string_passes import knowing, passes
 
 from groundstation.service.answers.model import RigModel
-from groundstation.service.hole.beginnings import MANY
+from groundstation.service.hole import beginnings
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
 
-STOPS = 56
+STOPS = 22  # so that there is a beginning of sixteen stops and one of twenty
 
 
 def adjusted(model: RigModel) -> Adjusted:
@@ -19,9 +20,9 @@ def adjusted(model: RigModel) -> Adjusted:
     return model.hole.examined.adjusted
 
 
-def test_many_looks_come_to_the_same_whatever_was_asked_before(tmp_path: Path) -> None:
+def test_many_looks_come_to_the_same_whatever_was_asked_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(beginnings, "MANY", 150)
     measurements = passes(STOPS, lambda _stop, station: 1.0 + 0.02 * station)
-    assert len(measurements) > MANY
     known, more = measurements[:-STOPS], measurements[-STOPS:]
     asked = knowing(tmp_path, known, STOPS)
     for measurement, md in more[::-1]:  # in another order, and asked after each
@@ -29,6 +30,7 @@ def test_many_looks_come_to_the_same_whatever_was_asked_before(tmp_path: Path) -
         asked.hole.settle()
     never = knowing(tmp_path, measurements, STOPS)
     one, other = adjusted(asked), adjusted(never)
+    assert len(other.looks) == len(measurements)
     assert one.now.tangents.tobytes() == other.now.tangents.tobytes()
     assert one.now.tubes.tobytes() == other.now.tubes.tobytes()
     assert asked.hole.trajectory.covs.tobytes() == never.hole.trajectory.covs.tobytes()
