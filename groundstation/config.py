@@ -13,6 +13,7 @@ from groundstation.errors import ConfigurationError
 from groundstation.plan_settings import PlanSettings
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.path.leg_wander import LegWander
+from groundstation.survey.path.stated_curvature import STATED_CURVATURE_DEG, STATED_LENGTH
 from groundstation.survey.wall.column_deviation import PRESETS, ColumnDesign
 from groundstation.survey.well.depth_errors import DepthErrors
 from telemetry import keys
@@ -69,8 +70,10 @@ class GroundConfig(BaseModel):
         Weighting.ADJUSTED, description="how the readings of one station count, or all of the hole in one adjustment"
     )
     play_std_deg: Positive = Field(0.01, description="of a tube against the hole at a stop, until the looks tell it")
-    curvature_std_deg_per_m: Positive = Field(0.3, description="of the hole's curvature, before the looks")
-    curvature_length: Positive = Field(20.0, description="m, over which a curvature is forgotten")
+    curvature_std_deg_per_m: Positive = Field(
+        STATED_CURVATURE_DEG, description="of the hole's curvature, before the looks"
+    )
+    curvature_length: Positive = Field(STATED_LENGTH, description="m, over which a curvature is forgotten")
     target: Positive = Field(30.0, description="m, length of the design axis")
     design_inclination_deg: float = Field(0.0, ge=0.0, le=180.0)
     design_azimuth_deg: float = 0.0

@@ -48,11 +48,6 @@ class TrajectoryStations:
     def __len__(self) -> int:
         return len(self.directions)
 
-    @property
-    def known(self) -> npt.NDArray[np.void]:
-        """Rows of the stations: a look at the table."""
-        return self.rows[: len(self.directions)]
-
     def insert(self, place: int, md: float, direction: Direction) -> None:
         """Insert a row for a station; what follows from its direction is not in it yet."""
         known, count = self.rows, len(self.directions)
@@ -70,7 +65,7 @@ class TrajectoryStations:
         """Append stations (m, direction) in their order; a depth that is not told is exact."""
         count, more = len(self), len(stations)
         if count + more > len(self.rows):
-            known, self.rows = self.known, np.zeros(count + more + count // GROWTH, ROW)
+            known, self.rows = self.rows[:count], np.zeros(count + more + count // GROWTH, ROW)
             self.rows[:count] = known
         for md, direction in stations:
             self.directions.append(direction)
@@ -104,7 +99,7 @@ class TrajectoryStations:
         for own, depth in zip(shared, self.depths, strict=True):
             own[depth.columns.places] = depth.columns.values[0]
         shared = shared[:, shared.any(axis=0)]
-        along = self.known["along"]
+        along = self.rows["along"][: len(self)]
         kinks = (along[:-1] - along[1:])[:, :, None] * shared[:-1, None]
         found = along[:, :, None] * shared[:, None]
         found[1:] += np.cumsum(kinks, axis=0)
