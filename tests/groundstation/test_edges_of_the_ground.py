@@ -289,9 +289,10 @@ def test_a_condition_that_comes_back_has_its_delay_anew(times: int) -> None:
     for _ in range(times):
         for _ in range(3):
             it.look(mild)
+            assert list(it.alarms) == []
             it.look(mild, after=0.9 * DELAYS[Level.DEGRADED])
+            assert list(it.alarms) == []
             it.look(after=0.5)
-        assert list(it.alarms) == []
     it.look(mild)
     it.look(mild, after=DELAYS[Level.DEGRADED])
     assert len(list(it.alarms)) == 1

@@ -1,7 +1,8 @@
-"""When a node saves and what it sends before: counted cycle by cycle, and a disk that refuses twice."""
+"""When a node saves, what it sends before and where it dates what it hears: counted cycle by cycle."""
 
 from __future__ import annotations
 
+import copy
 import errno
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from node.process.saver import AT_ONCE, RETRY_EVERY, SAVE_EVERY, SPACING, Saver
 from node.process.tube_process import TubeProcess
 from telemetry.application.clock import ClockFilter
 from telemetry.application.endpoint_state import STATE_LAYOUT
-from telemetry.messages import ENCODER, Command, Hello, NodeMode, Side
+from telemetry.messages import ENCODER, Aiding, Command, Hello, NodeMode, Side, TimeReply
 from telemetry.presentation.msgpack_codec import encode_message, open_payload
 from telemetry.schema import MessageKind
 from telemetry.transport.hop import HopLink, parse_frame
@@ -218,3 +219,28 @@ def test_surveys_that_are_sent_again_are_saved_with_the_next_frame(tmp_path: Pat
         reply = process._commands.obey(Command(3, 9, "resend", {"first": first, "last": last}))
         assert reply.done == (sent is not None)
         assert reply.values.get("sent") == sent
+
+
+@pytest.mark.parametrize("off", [1e-3, -1e-3])
+def test_an_aiding_is_dated_as_what_waits_is_until_the_cycle_moves_them_together(tmp_path: Path, off: float) -> None:
+    """Between an exchange and the next cycle the clock has stepped; all that waits is still dated by the old one."""
+    process, clock, found = TubeProcess(TubeSettings(3), tmp_path), ClockFilter(), []
+    process.endpoint.clock = clock
+    for k in range(8):
+        if k == 7:
+            old = copy.deepcopy(clock)
+            clock.take_step()
+        asked, wrong = 1000.0 + k, off if k == 7 else 0.0
+        at = asked + 17.0 + 3e-3 + wrong
+        clock.exchange(TimeReply(asked, at, at, at + 500.0, 1.0, 0.0, 1), asked + 6e-3)
+    plain = process.tube.on_aiding
+
+    def noted(aiding: Aiding, valid_local: float, clock_var: float = 0.0) -> Aiding | None:
+        found.append(valid_local)
+        return plain(aiding, valid_local, clock_var)
+
+    process.tube.on_aiding = noted  # type: ignore[method-assign]
+    rig = clock.rig_from_local(1007.0)
+    process._on_aiding(Aiding(1.0, 1e-8, 0.0, 0.0, 0.0, rig, 5, 0, epoch=1), 1007.01)
+    assert abs(clock.local_from_rig(rig) - old.local_from_rig(rig)) > 1e-5, "the clock has stepped"
+    assert found == [pytest.approx(old.local_from_rig(rig), abs=3e-6)]
