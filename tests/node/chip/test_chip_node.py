@@ -25,7 +25,7 @@ needs_emulator = needs("qemu-system-arm", "qemu-system-arm")
 @needs_emulator
 @pytest.mark.slow
 def test_a_chip_does_what_the_host_does_and_shows_it() -> None:
-    """Its float64 record too, with an order from outside between two cycles; a second chip knows nothing of the first."""
+    """Its float64 record too, with a change from outside between two cycles."""
     nodes = ChipNode(), FixedNode()
     rigs = [RoughNode(2, np.random.default_rng(4)) for _ in nodes]
     records = [node_of(2, 1, np.random.default_rng(4)) for _ in nodes]
