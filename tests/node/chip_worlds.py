@@ -13,11 +13,14 @@ from node.kernels.arithmetic.formats import DEG
 from node.kernels.step import fixed_node
 
 
-def rough_node(seed: int, imus: int, joints: int, cycles: int) -> Callable[[], None]:
+def rough_node(seed: int, imus: int, joints: int, cycles: int, lean: float = 0.3) -> Callable[[], None]:
     """A node of a rough string: faults of its sensors, jumps of its clock, other joints."""
 
     def drill() -> None:
-        rig, records = RoughNode(imus, np.random.default_rng(seed)), node_of(imus, joints, np.random.default_rng(seed))
+        rig, records = (
+            RoughNode(imus, np.random.default_rng(seed), lean),
+            node_of(imus, joints, np.random.default_rng(seed)),
+        )
         node = fixed_node.FixedNode()
         for k in range(cycles):
             node.step(*records, *rig.step(k))
@@ -32,6 +35,13 @@ def aligned(method: str) -> None:
     bench = known()
     assert bench.tube.align(method, 1.0) == ""
     bench.cycles(1).cycles(120, 7.0 * DEG).cycles(60)
+
+
+def failed() -> None:
+    """A filter whose covariance is none: it starts over."""
+    bench = known()
+    bench.tube.state["P"][3, 3] = -1e-4
+    bench.cycles(3).cycles(20, 71.0 * DEG)
 
 
 def recorded() -> None:
@@ -49,6 +59,9 @@ def every_world(cycles: int) -> Iterator[Callable[[], object]]:
     yield lambda: aligned("circle")
     yield lambda: aligned("extremes")
     yield recorded
+    yield failed
+    yield rough_node(9, 1, 0, cycles, lean=1.45)
+    yield rough_node(10, 2, 1, cycles, lean=2.6)
 
 
 def smoothed_strings() -> Iterator[Callable[[], object]]:

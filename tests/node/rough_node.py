@@ -19,6 +19,7 @@ class RoughNode:
 
     imus: int
     random: np.random.Generator
+    lean: float = 0.3
     yaw: float = 0.0
     spin: float = 0.0
     now: float = 1000.0
@@ -48,7 +49,7 @@ class RoughNode:
 
     def reading(self, imu: int, k: int) -> list[float]:
         """What one IMU reads."""
-        lean, random = 0.3, self.random
+        lean, random = self.lean, self.random
         rate = random.normal(0.0, 1.6e-4, 3) + 2e-4 * (imu + 1) + np.array([0.0, 0.0, 1.001 * self.spin])
         down = [-math.sin(lean) * math.cos(self.yaw), math.sin(lean) * math.sin(self.yaw), math.cos(lean)]
         pull = -9.81 * np.array(down) + random.normal(0.0, 3.4e-3, 3)
