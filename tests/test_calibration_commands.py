@@ -400,7 +400,9 @@ def test_a_calibration_that_was_changed_or_is_another_s_is_refused(tool: tuple, 
     assert "expected the calibration of an MWD triad" in refused("calibrate", "qc", CONTROL, "--accelerometers", path)
 
 
-@pytest.mark.parametrize("name", ["turntable", "attitudes", "mwd", "magnetometer", "qc", "record", "rests"])
+@pytest.mark.parametrize(
+    "name", ["turntable", "attitudes", "mwd", "magnetometer", "qc", "record", "rests", "temperature"]
+)
 def test_every_calibration_has_help_with_an_example_on_a_line_of_its_own(name: str) -> None:
     assert f"\n    borechain calibrate {name}" in run("calibrate", name, "--help").stdout
 
