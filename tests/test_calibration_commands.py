@@ -346,6 +346,33 @@ def test_a_record_is_described_in_a_line_and_written_for_a_node(tmp_path: Path) 
     )
 
 
+def test_a_certificate_has_number_serial_number_and_next_due_day(tmp_path: Path) -> None:
+    made = tmp_path / "gyro.pdf"
+    words = ("calibrate", "turntable", NODE_A1, "--reference", 720, "--certificate", made, "--date", "2024-05-31")
+    plain = run(*words)
+    assert plain.returncode == 0, plain.stderr
+    bare = made.read_bytes()
+    assert run(*words, "--serial", "A1-0042", "--number", "K-17", "--due", "2025-05-31").returncode == 0
+    assert made.read_bytes() != bare
+    late = refused(*words, "--due", "2024-05-31")
+    assert "--due: expected a day after that of the calibration, 2024-05-31, got 2024-05-31" in late
+
+
+def test_a_forced_calibration_says_so_in_its_file(tmp_path: Path) -> None:
+    from groundstation.calibration.block import read_calibration
+
+    record, out = tmp_path / "table.csv", tmp_path / "block.json"
+    rows = [row.split(",") for row in TABLE.splitlines() if row[:2] in ("x,", "y,", "z,")]
+    exchanged = [",".join([*row[:1], *row[3:5], *row[1:3], *row[5:]]) for row in rows]
+    record.write_text("\n".join(["axis,x_pos,x_neg,y_pos,y_neg,z_pos,z_neg", *exchanged]) + "\n")
+    words = ("calibrate", "turntable", record, "--reference", 720, "--out", out)
+    assert "refused by right-handed: the axes are left-handed" in refused(*words)
+    assert not out.exists()
+    found = answer(*words, "--force")
+    assert found["forced"][0].startswith("right-handed: ")
+    assert "; forced past right-handed: " in read_calibration(out).provenance.design
+
+
 def test_outputs_land_together_or_not_at_all(tmp_path: Path) -> None:
     out = tmp_path / "a.json"
     done = run(
@@ -373,7 +400,9 @@ def test_a_calibration_that_was_changed_or_is_another_s_is_refused(tool: tuple, 
     assert "expected the calibration of an MWD triad" in refused("calibrate", "qc", CONTROL, "--accelerometers", path)
 
 
-@pytest.mark.parametrize("name", ["turntable", "attitudes", "mwd", "magnetometer", "qc", "record", "rests"])
+@pytest.mark.parametrize(
+    "name", ["turntable", "attitudes", "mwd", "magnetometer", "qc", "record", "rests", "temperature"]
+)
 def test_every_calibration_has_help_with_an_example_on_a_line_of_its_own(name: str) -> None:
     assert f"\n    borechain calibrate {name}" in run("calibrate", name, "--help").stdout
 

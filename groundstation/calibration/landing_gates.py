@@ -28,7 +28,8 @@ LARGEST_SHARE: Final = 2e-3  # of the largest rate, the same of a gyroscope; a p
 CLIPPED: Final = 3  # readings at one outermost value
 CHANCE: Final = 0.001  # of an honest record to fail a gate that weighs noise
 CHANCE_OF_ORDER: Final = 0.01  # the same of the order of residuals, where intervals suffer before a walk is plain
-FEWEST_FREE: Final = 4  # degrees of freedom of a residual whose order or shape is judged
+FEWEST_FREE: Final = 4  # degrees of freedom of a residual whose shape is judged
+FEWEST_FOR_ORDER: Final = 8  # the same where it is their order: of fewer, chance and a walk look alike
 DRAWS: Final = 4000  # of noise, for the order of residuals
 SEED: Final = 3
 HALVES: Final = 12  # readings from which each half can be judged by the other
@@ -185,7 +186,7 @@ def _better(truth: Array, readings: Array, fit: AttitudeFit, nominal: float) -> 
 def _order(truth: Array, fit: AttitudeFit) -> Gate:
     """Whether residuals follow on each other in the order of the record: a bias that walks, a sensor that warms up."""
     n = len(truth)
-    if n - 4 < FEWEST_FREE:
+    if n - 4 < FEWEST_FOR_ORDER:
         return Gate("drift", holds=True)
     basis = np.column_stack([np.ones(n), truth])
     left = np.eye(n) - basis @ np.linalg.pinv(basis)

@@ -42,6 +42,9 @@ output_options = (
     click.option("--certificate", type=PATH, help="Certificate as PDF."),
     click.option("--date", type=click.DateTime(["%Y-%m-%d"]), help="Day of the calibration.  [default: today, UTC]"),
     click.option("--subject", help="What was calibrated, for the certificate.  [default: name of FILE]"),
+    click.option("--serial", default="", help="Serial number of what was calibrated, for the certificate."),
+    click.option("--number", default="", help="Number of the certificate."),
+    click.option("--due", type=click.DateTime(["%Y-%m-%d"]), help="Day of the next calibration, for the certificate."),
     json_option,
 )  # of WantedFiles
 
@@ -57,17 +60,29 @@ class WantedFiles:
     date: datetime.datetime | None
     subject: str | None
     as_json: bool
+    serial: str = ""
+    number: str = ""
+    due: datetime.datetime | None = None
 
     @property
     def day(self) -> datetime.date:
         """Day of the calibration, that of today in UTC by default."""
         return (self.date or datetime.datetime.now(datetime.UTC)).date()
 
+    @property
+    def papers(self) -> tuple[tuple[str, str], ...]:
+        """What the laboratory's books say of the certificate, as far as it is told."""
+        due = self.due.date().isoformat() if self.due is not None else ""
+        told = (("Certificate", self.number), ("Serial number", self.serial), ("Next due", due))
+        return tuple((name, text) for name, text in told if text)
+
     def check(self, *more: Path) -> None:
         """Refuse paths that cannot be meant, and what is not installed, before anything is computed."""
         paths = [self.file, *more, *filter(None, (self.out, self.plot, self.certificate))]
         if len({path.resolve() for path in paths}) < len(paths):
             raise InputFault("expected different files for the record, --out, --plot and --certificate")
+        if self.due is not None and self.due.date() <= self.day:
+            raise InputFault(f"--due: expected a day after that of the calibration, {self.day}, got {self.due.date()}")
         check_suffix("--plot", self.plot, *PLOT_FORMATS)
         check_suffix("--certificate", self.certificate, ".pdf")
         for path in (self.out, *more):
@@ -109,7 +124,8 @@ def rendered_files(outcome: CalibrationOutcome, wanted: WantedFiles, day: dateti
         files[wanted.plot] = render_panels(panels, wanted.plot.suffix[1:])
     if wanted.certificate is not None:
         subject, record = wanted.subject or wanted.file.stem, wanted.file
-        identity = Identity(subject, day, record.name, outcome.record_sha256, outcome.block_sha256, __version__)
+        hashes = (outcome.record_sha256, outcome.block_sha256)
+        identity = Identity(subject, day, record.name, *hashes, __version__, wanted.papers)
         files[wanted.certificate] = certificate_pdf(outcome.sheet, panels, identity)
     return files
 

@@ -15,11 +15,13 @@ from groundstation.report.calibrations.calibration_request import (
     MwdRequest,
     QualityRequest,
     RestsRequest,
+    TemperatureRequest,
     TurntableRequest,
 )
 from groundstation.report.calibrations.linear_outcome import answer_attitudes, answer_turntable
 from groundstation.report.calibrations.quality_outcome import answer_quality
 from groundstation.report.calibrations.rests_outcome import answer_rests
+from groundstation.report.calibrations.temperature_outcome import answer_temperature
 from groundstation.report.calibrations.triad_outcome import answer_magnetometer, answer_mwd
 
 
@@ -39,5 +41,6 @@ def answer_calibration(request: CalibrationRequest, day: str) -> CalibrationOutc
         AllanRequest: answer_allan,
         RestsRequest: answer_rests,
         QualityRequest: answer_quality,
+        TemperatureRequest: answer_temperature,
     }
     return answers[type(request)](request, day)

@@ -142,6 +142,18 @@ class RestsRequest:
     words: RecordWords = RecordWords()
 
 
+@dataclass(frozen=True, slots=True)
+class TemperatureRequest:
+    """A triad at known truths and several temperatures; ``unit`` of the file, degrees of the polynomials."""
+
+    file: Path
+    unit: str = "deg/s"
+    bias_degree: int = 2
+    matrix_degree: int = 1
+    full_scale: float = NO_LIMIT
+    force: bool = False
+
+
 CalibrationRequest = (
     TurntableRequest
     | AttitudesRequest
@@ -150,4 +162,5 @@ CalibrationRequest = (
     | QualityRequest
     | AllanRequest
     | RestsRequest
+    | TemperatureRequest
 )

@@ -11,10 +11,11 @@ from node.process.drivers.quadrature import QuadratureFile
 from node.process.drivers.replay_drivers import ReplayEncoder, ReplayImu
 from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.drivers.timed import TimedEncoder, TimedImu
+from node.process.drivers.vn100 import Vn100
 from telemetry.errors import RecordError
 from telemetry.records.record_reading import RecordReading, read_told
 
-IMU_FORMS = "replay:FILE, timed:FILE, iio:NAME, mpu6500:BUS or mpu6500:BUS:ADDRESS"
+IMU_FORMS = "replay:FILE, timed:FILE, iio:NAME, vn100:DEVICE, mpu6500:BUS or mpu6500:BUS:ADDRESS"
 COUNTER_FORMS = "replay:FILE, timed:FILE or counter:FILE"
 LARGEST_BUS = 255
 ADDRESSES = (0x68, 0x69)
@@ -35,6 +36,8 @@ def imu_source(text: str) -> ImuSource:
         return TimedImu(*told_recording("imu", rest))
     if kind == "iio" and rest:
         return IioImu(rest)
+    if kind == "vn100" and rest:
+        return Vn100(Path(rest))
     if kind == "mpu6500":
         bus, _, address = rest.partition(":")
         try:

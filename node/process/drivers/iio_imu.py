@@ -138,7 +138,7 @@ class IioImu:
         wx, wy, wz, fx, fy, fz = (values @ weights).tolist()
         at_range = [self._channels[name].is_at_range(frames) for name in WANTED]
         saturated = int(any(at_range[:3])) | 2 * int(any(at_range[3:]))
-        warmth = USUAL
+        warmth = float(USUAL)
         if WARMTH in self._channels:
             warmth = MILLI * float(self._channels[WARMTH].take(frames).mean())
         sample = ImuSample((wx, wy, wz), (fx, fy, fz), warmth, saturated, late=end - self._newest)

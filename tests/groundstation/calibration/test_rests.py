@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.optimize
 from scipy.spatial.transform import Rotation
 
 from groundstation.calibration.block import from_json
@@ -75,6 +76,25 @@ def test_standard_errors_are_those_of_many_records(tmp_path: Path) -> None:
         )
     sizes = np.abs([one for one in off if one != 0.0])
     assert np.sqrt(np.mean(sizes**2)) < 1.6
+
+
+@pytest.mark.slow
+def test_rests_that_were_not_used_are_judged_by_the_other_half_and_by_an_independent_solver(tmp_path: Path) -> None:
+    rows = laid_down(seed=4)
+    found = calibrated(tmp_path, rows).result
+    means = np.array([rows[a - 1 : b, 4:7].mean(axis=0) for a, b in (rest["lines"] for rest in found["rests"])])
+
+    def sizes(p: np.ndarray, of: np.ndarray) -> np.ndarray:
+        shape = np.array([[p[0], p[1], p[2]], [0.0, p[3], p[4]], [0.0, 0.0, p[5]]])
+        return np.linalg.norm((of - p[6:]) @ shape.T, axis=1) - G
+
+    left = []
+    for first in (0, 1):
+        start = [1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+        solved = scipy.optimize.least_squares(sizes, start, args=(means[first::2],), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        left.extend(sizes(solved.x, means[1 - first :: 2]))
+    assert found["left_out_rms"] == pytest.approx(np.sqrt(np.mean(np.square(left))), rel=1e-3)
+    assert found["left_out_rms"] > found["residual_rms"]
 
 
 @pytest.mark.slow
