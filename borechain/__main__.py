@@ -48,6 +48,7 @@ COMMANDS = {
         "wall",
         "Judge a wall: overlap, thickness, probability of a gap.",
     ),
+    "export": ("borechain.cli.export.export_command", "export", "Write a hole or a wall as a file of other programs."),
     "link": ("borechain.cli.link.link", "link", "Between tubes: radio through soil and pipe, load of a CAN bus."),
     "bench": ("borechain.cli.bench.bench", "bench", "Measure speed side by side with other libraries."),
     "campaign": (
