@@ -27,6 +27,10 @@ def export() -> None:
 
     DXF for drawings, IFC4 for building models, GeoJSON for maps, WITSML 2.1 with the covariance of every station,
     LAS 2.0, DIGGS 3.0 and AGS 4.1.1. Nothing outside this machine is asked.
+
+    \b
+    Example:
+      borechain export wall scenarios/walls/wall-40.toml --format dxf --out wall.dxf
     """
 
 
@@ -81,7 +85,7 @@ def hole(request: SurveyRequest, form: str, out: Path, name: str | None) -> None
     from borechain import api
     from groundstation.survey.exports.export_request import site_of_survey
 
-    day = datetime.date.fromisoformat(request.site.date) if request.site.date else today()
+    day = datetime.date.fromisoformat(request.site.date) if request.site.date else day_of_file()
     answer = api.answer_survey(request)
     write_export(site_of_survey(answer, name or request.file.stem, day), form, None, out)
 
@@ -100,10 +104,10 @@ def wall(file: Path, form: str, out: Path, hole: str | None, grid_crs: str) -> N
     from groundstation.survey.exports.export_request import site_of_wall
 
     judged = api.wall(file)
-    write_export(site_of_wall(judged.wall, judged.judgement, today(), grid_crs), form, hole, out)
+    write_export(site_of_wall(judged.wall, judged.judgement, day_of_file(), grid_crs), form, hole, out)
 
 
-def today() -> datetime.date:
+def day_of_file() -> datetime.date:
     """Day of the file."""
     return datetime.datetime.now(datetime.UTC).date()
 

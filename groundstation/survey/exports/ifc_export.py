@@ -11,7 +11,7 @@ THINNEST = 0.05  # m, radius of a hole that has none
 OWN = uuid.UUID("1f2f6c4e-5c2b-5b54-8f6b-4b7c8b0d6f20")  # of names of ours
 
 
-class _Writer:
+class _StepLines:
     """Lines of a STEP file, numbered."""
 
     def __init__(self) -> None:
@@ -27,7 +27,7 @@ class _Writer:
 
 def ifc_bytes(site: ExportSite) -> bytes:
     """Model in m; the site stands at the first head, so that far coordinates keep their digits."""
-    w = _Writer()
+    w = _StepLines()
     origin = site.holes[0].axis[0].tolist()
     context, placed, project = _frame(w, site, origin)
     piles = [_pile(w, hole, origin, context, placed) for hole in site.holes]
@@ -41,7 +41,7 @@ def ifc_bytes(site: ExportSite) -> bytes:
     return (head + "\n".join(w.lines) + "\nENDSEC;\nEND-ISO-10303-21;\n").encode("ascii")
 
 
-def _frame(w: _Writer, site: ExportSite, origin: list[float]) -> tuple[str, str, str]:
+def _frame(w: _StepLines, site: ExportSite, origin: list[float]) -> tuple[str, str, str]:
     """Context of the shapes, placement of the site, and the site."""
     zero = w.add(f"IFCAXIS2PLACEMENT3D({w.point([0.0, 0.0, 0.0])},$,$)")
     context = w.add(f"IFCGEOMETRICREPRESENTATIONCONTEXT($,'Model',3,1.E-06,{zero},$)")
@@ -61,7 +61,7 @@ def _frame(w: _Writer, site: ExportSite, origin: list[float]) -> tuple[str, str,
     return context, placed, found
 
 
-def _pile(w: _Writer, hole: ExportHole, origin: list[float], context: str, placed: str) -> str:
+def _pile(w: _StepLines, hole: ExportHole, origin: list[float], context: str, placed: str) -> str:
     points = [w.point([a - b for a, b in zip(row, origin, strict=True)]) for row in hole.axis.tolist()]
     line = w.add(f"IFCPOLYLINE(({','.join(points)}))")
     solid = w.add(f"IFCSWEPTDISKSOLID({line},{_real(hole.radius or THINNEST)},$,$,$)")

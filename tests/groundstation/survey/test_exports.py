@@ -1,4 +1,4 @@
-"""Files of other programs: each is accepted by somebody else's validator, refused with a defect, and read back."""
+"""Files of other programs: each is accepted by the validator of its format, refused with a defect, and read back."""
 
 import csv
 import dataclasses
