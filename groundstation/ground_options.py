@@ -13,7 +13,6 @@ from groundstation.plan_settings import read_plan
 from telemetry.runtime.process_options import PlaceRequest, clock_option, key_option, keys_option, place_options
 from telemetry.runtime.typed_options import gather_options
 
-TOLERANCES = ("en-12716", "5-cm", "0.27-deg")
 POSITIVE = click.FloatRange(0.0, min_open=True)
 WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive", "adjusted")
 
@@ -106,10 +105,10 @@ ground_options = gather_options(
     ),
     click.option(
         "--tolerance",
-        type=click.Choice(TOLERANCES),
-        default=TOLERANCES[0],
+        default="en-12716",
         show_default=True,
-        help="Limit of the deviation from the design axis.",
+        metavar="LIMIT",
+        help="Limit of the deviation from the design axis: en-12716, 5-cm, 0.27-deg, or a sum such as '50 mm + 1:200'.",
     ),
     click.option(
         "--steering-deg-per-m",

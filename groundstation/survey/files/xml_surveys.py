@@ -86,6 +86,8 @@ def _witsml(path: Path, holes: list[Element], known: str, version: str) -> Field
 def _measure(path: Path, station: Element, quantity: str, units: dict[str, str]) -> str:
     """Text of a measure; its unit is to be that of all stations before."""
     found = _child(station, quantity)
+    if found is not None and len(found):  # version 2 has depths inside
+        found = _child(found, "MeasuredDepth")
     if found is None or not (found.text or "").strip():
         return ""
     unit = found.get("uom", "")

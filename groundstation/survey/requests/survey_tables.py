@@ -6,6 +6,7 @@ import csv
 import io
 from typing import Any
 
+from groundstation.entry.quoted_cells import quoted_cell
 from groundstation.survey.requests.site_place import site_words
 from groundstation.survey.well.analysis import Analysis
 from groundstation.survey.well.reference_frames import ReferenceFrame
@@ -42,6 +43,7 @@ def station_table_text(rows: list[dict[str, Any]], frame: ReferenceFrame, site: 
     of_site = [] if site is None else ["site"]
     writer.writerow([*plain, *(f"uncertainty_{key}" for key in half), *FRAME, *of_grid, *of_site])
     named = frame_words(frame) + ([] if frame.grid is None else [frame.grid.north])
+    named = [str(quoted_cell(word)) for word in named]
     named += [] if site is None else [site_words(site).removeprefix("site: ")]
     writer.writerows(
         [[*(row[key] for key in plain), *(row["uncertainty"][key] for key in half), *named] for row in rows]

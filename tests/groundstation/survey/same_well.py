@@ -69,7 +69,8 @@ def witsml_1() -> bytes:
 
 def witsml_2(version: str = "2.1", doctype: str = "", md: str = "") -> bytes:
     rows = "".join(
-        f'<w:TrajectoryStation uid="{k}"><w:Md uom="m">{md or row[0]}</w:Md><w:Incl uom="dega">{row[1]}</w:Incl>'
+        f'<w:TrajectoryStation uid="{k}"><e:Md><e:MeasuredDepth uom="m">{md or row[0]}</e:MeasuredDepth></e:Md>'
+        f'<w:Incl uom="dega">{row[1]}</w:Incl>'
         f'<w:Azi uom="dega">{row[2]}</w:Azi></w:TrajectoryStation>'
         for k, row in enumerate(ROWS)
     )
