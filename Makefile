@@ -14,7 +14,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts bounds kernels kernels-of-floats kernels-of-integers bytecode browser fast tests planted statistical truth explore lock study studies soak seeds clean test-socketcan test-compose
+.PHONY: help rig test quick check lint types contracts bounds kernels kernels-of-floats kernels-of-integers bytecode browser fast tests planted statistical truth explore lock study studies soak seeds clean test-socketcan test-firmware test-compose
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-20s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -113,6 +113,10 @@ seeds: $(STAMP)  ## fresh seeds of the gauntlet, SEEDS of them FROM one on
 
 test-socketcan: $(STAMP)  ## joints on the kernel's own CAN, in a User-Mode Linux; says why where there is none
 	$(BIN)/python tests/tools/socketcan.py
+
+test-firmware: $(STAMP)  ## the step in C on this machine and on emulated chips; installs Debian's compilers and emulators, or says why not
+	$(PYTHON) tests/tools/install_compilers.py
+	$(PYTEST) --timeout 1800 tests/node/chip tests/test_firmware_command.py
 
 test-compose: $(STAMP)  ## docker-compose.yml in containers until two tubes are surveyed; says why where that cannot be
 	$(BIN)/python tests/tools/compose.py $(COLD)
