@@ -87,6 +87,9 @@ class SetupSection(ScenarioSection):
     untold: tuple[Literal["north", "collar", "joints", "mounts", "stick-up"], ...] = Field(
         (), description="what the crew does not tell, of north, collar, joints, mounts and stick-up"
     )
+    unchecked: tuple[Literal["north", "stick-up"], ...] = Field(
+        (), description="of what it tells, and no reading shows, what it does not check by a second reading"
+    )
     north_std_deg: Positive = Field(EXACTLY_DEG, description="stated of the encoder's zero against north")
     collar_std_deg: Positive = Field(EXACTLY_DEG, description="stated of the direction at the collar, each way")
     stick_up_std_m: Positive = Field(0.01, description="stated of the stick-up, read by hand with a rule")
