@@ -12,6 +12,7 @@ from forked_commands import run
 ROOT = Path(__file__).parents[1]
 POTSDAM = ROOT / "scenarios" / "wellbore-1-path.csv"
 WALL = ROOT / "scenarios" / "walls" / "wall-40.toml"
+SITE = ("--field-nt", 50_000, "--dip-deg", 70, "--declination-deg", 0)
 
 
 def answer(*words: object, status: int = 0) -> dict:
@@ -59,11 +60,13 @@ def test_a_held_azimuth_replaces_the_gyro(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_files_of_a_survey_land_whole(tmp_path: Path) -> None:
     table, plot, tool = tmp_path / "a" / "t.csv", tmp_path / "p.svg", tmp_path / "tool.json"
-    answer("survey", POTSDAM, "--instrument", "mwd-rev5.1", "--out", table, "--plot", plot, "--export-tool", tool)
+    answer(
+        "survey", POTSDAM, "--instrument", "mwd-rev5.1", *SITE, "--out", table, "--plot", plot, "--export-tool", tool
+    )
     assert len(table.read_text().splitlines()) == 12
     assert plot.read_text().startswith("<?xml")
-    again = answer("survey", POTSDAM, "--instrument", tool)
-    first = answer("survey", POTSDAM, "--instrument", "mwd-rev5.1")
+    again = answer("survey", POTSDAM, "--instrument", tool, *SITE)
+    first = answer("survey", POTSDAM, "--instrument", "mwd-rev5.1", *SITE)
     one, two = (f["stations"][-1]["uncertainty"]["covariance_m2"] for f in (first, again))
     np.testing.assert_allclose(two, one, rtol=1e-9, atol=1e-15)
     assert not list(tmp_path.rglob("*.new"))
@@ -151,7 +154,7 @@ def test_a_sidetrack_is_compared_from_where_it_leaves_its_hole(tmp_path: Path) -
     one.write_text("MD (m),Inc,Azi\n0,0,0\n30,5,0\n60,10,0\n90,10,0\n120,10,0\n")
     other.write_text("MD (m),Inc,Azi\n60,10,0\n90,20,90\n120,40,90\n")
     whole.write_text("MD (m),Inc,Azi\n0,0,0\n30,5,0\n60,10,0\n90,20,90\n120,40,90\n")
-    words = ("--instrument", "mwd-rev4", "--from-m", 60)
+    words = ("--instrument", "mwd-rev4", "--from-m", 60, *SITE)
     begins, cut = (answer("clearance", one, path, *words, status=3) for path in (other, whole))
     assert begins["from_m"] == 60.0
     assert [row["md_m"] for row in begins["stations"]] == [60.0, 90.0, 120.0]
@@ -268,7 +271,7 @@ def test_a_tool_that_cannot_be_used_is_refused_with_its_term(tmp_path: Path, cha
     )
     record = tmp_path / "vertical.csv"
     record.write_text("md_m,inclination_deg,azimuth_deg\n0,0,0\n10,0,0\n20,0,0\n")
-    assert named in refused("survey", record, "--instrument", tool)
+    assert named in refused("survey", record, "--instrument", tool, *SITE)
 
 
 @pytest.mark.slow

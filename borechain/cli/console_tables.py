@@ -54,3 +54,9 @@ def cell_text(value: Any) -> str:
     if value is None:
         return ""
     return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def show_warnings(paper: Console, rows: list[dict[str, Any]]) -> None:
+    """Print warnings of what was read, one a line."""
+    for row in rows:
+        paper.print(f"WARNING ({row['kind']}): {row['text']}", markup=False)

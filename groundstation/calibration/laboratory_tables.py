@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.null_values import is_null
 from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
@@ -98,4 +99,6 @@ def _number(name: str, line: int, column: str, text: str) -> float:
         raise line_error(name, line, f"a number in column {column}", f"{text!r}") from error
     if not math.isfinite(value):
         raise line_error(name, line, f"a finite number in column {column}", f"{text}")
+    if is_null(value, angle=True):
+        raise line_error(name, line, f"a reading in column {column}", f"{text}, which stands for no value")
     return value

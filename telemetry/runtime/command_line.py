@@ -22,11 +22,16 @@ R = TypeVar("R")
 
 EXTRA_OF = {
     "cantools": "can",
+    "defusedxml": "files",
     "distributed": "campaign",
+    "ezdxf": "files",
     "matplotlib": "ground",
     "mcap": "ground",
+    "openpyxl": "files",
     "orjson": "ground",
     "pyarrow": "campaign",
+    "pygeomag": "files",
+    "pyproj": "files",
     "rich": "ground",
     "scipy": "ground",
     "smbus2": "board",
@@ -35,6 +40,7 @@ EXTRA_OF = {
     "textual": "ground",
     "typst": "ground",
     "uvicorn": "ground",
+    "welleng": "landmark",
 }  # by the module it brings
 
 

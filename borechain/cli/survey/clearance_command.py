@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from borechain.cli.console_tables import table_console
+from borechain.cli.console_tables import show_warnings, table_console
 from borechain.cli.faults import plain_faults
 from borechain.cli.shared_options import json_option
 from borechain.cli.survey.site_options import site_options
@@ -46,6 +46,8 @@ clearance_options = gather_options(
         type=float,
         help="Of a sidetrack: depth of a station of both, down to which they are one hole.",
     ),
+    click.option("--hole", metavar="NAME", help="Of a REFERENCE that holds several."),
+    click.option("--offset-hole", metavar="NAME", help="Of an OFFSET that holds several."),
     click.option("--k", type=click.FloatRange(0.0, min_open=True), default=3.5, show_default=True, help="Of the rule."),
     click.option(
         "--sigma-ahead-m", type=click.FloatRange(0.0), default=0.5, show_default=True, help="Of projecting ahead."
@@ -101,6 +103,8 @@ def show_clearance(result: dict[str, Any], title: str) -> None:
     """Factors of every station and the verdict, for people."""
     from rich.table import Table
 
+    from groundstation.survey.requests.site_place import site_words
+
     paper = table_console(100)
     table = Table(title=f"Clearance of {title}, true north, depths from their heads")
     for name in ("MD m", "offset MD m", "distance m", "sigma m", "factor", "as if nothing is shared"):
@@ -108,6 +112,8 @@ def show_clearance(result: dict[str, Any], title: str) -> None:
     for row in result["stations"]:
         table.add_row(*(f"{value:.3f}" for value in row.values()))
     paper.print(table)
+    show_warnings(paper, result["warnings"])
+    paper.print(site_words(result["site"]), markup=False)
     verdict = "clear" if result["clear"] else "TOO NEAR"
     least, nearest = result["least"], result["nearest"]
     decides = min(least["factor"], least["independent_factor"])

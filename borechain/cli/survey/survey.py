@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from borechain.cli.console_tables import table_console
+from borechain.cli.console_tables import show_warnings, table_console
 from borechain.cli.faults import plain_faults
 from borechain.cli.shared_options import json_option
 from borechain.cli.survey.survey_options import SurveyFiles, survey_options
@@ -33,7 +33,7 @@ def survey(request: SurveyRequest, files: SurveyFiles, as_json: bool) -> None:
     \b
     Examples:
       borechain survey scenarios/wellbore-1-path.csv --displacement-rule thesis
-      borechain survey stations.csv --method minimum-curvature --instrument mwd-rev5.1 --sigma 2 --plot survey.svg
+      borechain survey stations.csv --sigma 2 --instrument mwd-rev5.1 --at 52.4,13.1 --date 2026-11-27 --plot survey.svg
     """
     from borechain import api
 
@@ -51,7 +51,7 @@ def write_survey(answer: SurveyAnswer, files: SurveyFiles) -> None:
     from groundstation.survey.requests.survey_tables import source_table_text, station_table_text
 
     if files.out is not None:
-        write_whole(files.out, station_table_text(answer.result["stations"], answer.found.frame))
+        write_whole(files.out, station_table_text(answer.result["stations"], answer.found.frame, answer.result["site"]))
     if files.by_source is not None:
         write_whole(files.by_source, source_table_text(answer.found))
     if files.plot is not None:
@@ -74,8 +74,12 @@ def show_survey(result: dict[str, Any]) -> None:
     """Tables for people."""
     from rich.table import Table
 
+    from groundstation.survey.requests.site_place import site_words
+
     paper = table_console(110)
     paper.print(result["read_as"], markup=False)
+    show_warnings(paper, result["warnings"])
+    paper.print(site_words(result["site"]), markup=False)
     words = (
         result["method"],
         result["instrument"],

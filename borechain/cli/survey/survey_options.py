@@ -122,7 +122,13 @@ survey_options = gather_options(
         help="How lateral displacements become angles.",
     ),
     click.option("--from-collar", is_flag=True, help="Add a vertical station at 0 m, where FILE begins deeper."),
-    click.option("--md-unit", type=click.Choice(["m", "ft"]), help="Unit of a depth whose header does not say; m."),
+    click.option("--hole", metavar="NAME", help="Hole of a table of several; '*' where all rows are one."),
+    click.option(
+        "--decimal", type=click.Choice(["comma", "point"]), help="Sign of decimals, where FILE may be read either way."
+    ),
+    click.option(
+        "--md-unit", type=click.Choice(["m", "ft", "usft"]), help="Unit of a depth whose header does not say; m."
+    ),
     click.option("--md", type=float, multiple=True, help="Also give the position at this depth, m. Repeatable."),
     click.option(
         "--tie-on",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from borechain import __version__
-from borechain.cli.console_tables import table_console
+from borechain.cli.console_tables import show_warnings, table_console
 from borechain.cli.faults import InputFault, plain_faults
 from borechain.cli.shared_options import json_option
 from borechain.cli.whole_files import PLOT_FORMATS, check_suffix, write_whole
@@ -119,6 +119,8 @@ def show_wall(result: dict[str, Any]) -> None:
     paper.print(f"[{colour}]{result['wall']}: {result['verdict']}[/] ({frame})")
     ends = {f"{row['tight_from_m']:g} to {row['tight_to_m']:g} m" for row in result["joints"]}
     paper.print(f"to be tight from {ends.pop() if len(ends) == 1 else 'the upper head to the lower toe of each joint'}")
+    touching = {finding["text"] for finding in result["findings"]}
+    show_warnings(paper, [row for row in result["warnings"] if row["text"] not in touching])
     for finding in result["findings"]:
         paper.print(f"  {finding['kind']}: {finding['text']}", markup=False)
     table = Table(title=f"the {min(SHOWN, len(result['joints']))} most doubtful of {len(result['joints'])} joints")

@@ -6,6 +6,7 @@ import csv
 import io
 from typing import Any
 
+from groundstation.entry.quoted_cells import quoted_cell
 from groundstation.errors import SelectorError
 from groundstation.service.answers.shapes.answer_fields import AnswerField, Fields
 
@@ -52,4 +53,4 @@ def csv_cell(row: View, names: tuple[str, ...]) -> Any:
     value: Any = row
     for name in names:
         value = None if value is None else value[name]
-    return " ".join(map(str, value)) if isinstance(value, list) else value
+    return quoted_cell(" ".join(map(str, value)) if isinstance(value, list) else value)

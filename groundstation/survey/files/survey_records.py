@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
 from groundstation.survey.bearings import wrap_azimuth
 from groundstation.survey.well.well_record import SurveyRecord
@@ -74,7 +75,7 @@ def with_collar(record: SurveyRecord) -> SurveyRecord:
         raise SurveyError(f"collar: expected a record that begins below 0 m, got {record.md[0]:g} m")
     columns = {name: np.concatenate([values[:1], values]) for name, values in record.columns.items()}
     md, inclination, azimuth = (np.concatenate([[0.0], a]) for a in (record.md, record.inclination, record.azimuth))
-    return SurveyRecord(md, inclination, azimuth, [0, *record.lines], columns, record.of_displacements)
+    return SurveyRecord(md, inclination, azimuth, [0, *record.lines], columns, record.of_displacements, record.warnings)
 
 
 def read_columns(
@@ -164,9 +165,10 @@ def _finite(path: Path, name: str, values: Array, lines: list[int]) -> None:
             raise SurveyError(f"{path}: line {number}: expected a finite {name}, got {value}")
 
 
-def _check(path: Path, md: Array, lines: list[int]) -> None:
-    if len(md) < 2:
-        raise SurveyError(f"{path}: expected at least two stations, the first one the collar, got {len(md)}")
+def _check(path: Path, md: Array, lines: list[int], fewest: int = 2) -> None:
+    if len(md) < fewest:
+        words = "two stations, the first one the collar" if fewest == 2 else "one station"
+        raise SurveyError(f"{path}: expected at least {words}, got {len(md)}")
     back = np.flatnonzero(~(np.diff(md) > 0.0))
     if len(back):
         k = int(back[0])
@@ -176,7 +178,7 @@ def _check(path: Path, md: Array, lines: list[int]) -> None:
         )
 
 
-def stations_of(path: Path, table: dict[str, Array], lines: list[int]) -> SurveyRecord:
+def stations_of(path: Path, table: dict[str, Array], lines: list[int], fewest: int = 2) -> SurveyRecord:
     """Record of the columns ``STATIONS`` and what stands beside them; errors as ``read_record``."""
     for name in STATIONS:
         _finite(path, name, table[name], lines)
@@ -185,7 +187,10 @@ def stations_of(path: Path, table: dict[str, Array], lines: list[int]) -> Survey
     if len(outside):
         k = int(outside[0])
         raise SurveyError(f"{path}: line {lines[k]}: expected an inclination of 0..180 deg, got {inclination_deg[k]:g}")
-    _check(path, md, lines)
+    turned = np.flatnonzero(np.abs(azimuth_deg) > RANGES["azimuth_deg"].high)
+    if len(turned):
+        RANGES["azimuth_deg"].check(f"{path}: line {lines[int(turned[0])]}: azimuth_deg", float(azimuth_deg[turned[0]]))
+    _check(path, md, lines, fewest)
     return SurveyRecord(md, np.radians(inclination_deg), np.radians(azimuth_deg), lines, _others(table, STATIONS))
 
 

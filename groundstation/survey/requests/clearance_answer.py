@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.entry_warning import EntryWarning, warning_rows
+from groundstation.entry.station_plausibility import radius_warnings, station_warnings
 from groundstation.errors import SurveyError
 from groundstation.survey.files.field_files import read_any
+from groundstation.survey.files.field_table import TableWish
 from groundstation.survey.path.leg_wander import LegWander
+from groundstation.survey.path.stated_curvature import STATED_CURVATURE_DEG
 from groundstation.survey.requests.clearance_request import ClearanceRequest
+from groundstation.survey.requests.finite_figures import check_figures
+from groundstation.survey.requests.site_place import known_site
+from groundstation.survey.requests.survey_answer import magnetic_needs
+from groundstation.survey.requests.survey_request import FrameRequest
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.well.analysis import record_variables
 from groundstation.survey.well.clearance import Clearance, ClearanceHole, Rule, Separations, clearance_between
@@ -22,7 +31,6 @@ from groundstation.survey.well.reference_frames import SAME_DEPTH
 from groundstation.survey.well.well_record import SurveyRecord
 
 Array = npt.NDArray[np.float64]
-RELAY_CURVATURE_DEG = 0.3  # deg/m, as a ground station has it while it drills
 SAME_PLACE = 0.1  # m, of two records of one hole
 
 
@@ -48,13 +56,15 @@ def answer_clearance(request: ClearanceRequest) -> dict[str, Any]:
     SurveyError, ToolError
         When a record or an instrument cannot be used.
     """
+    check_figures(request)
     serial = "one" if request.same_instrument else ""
     mine = _Described(
-        str(request.reference), read_any(request.reference).record, request.instrument, np.zeros(3), request.radius_m
-    )
+        str(request.reference), _record(request.reference, request.hole), request.instrument, np.zeros(3),
+        request.radius_m,
+    )  # fmt: skip
     theirs = _Described(
-        str(request.offset), read_any(request.offset).record, request.offset_instrument or request.instrument,
-        np.array(request.offset_head), request.offset_radius_m,
+        str(request.offset), _record(request.offset, request.offset_hole),
+        request.offset_instrument or request.instrument, np.array(request.offset_head), request.offset_radius_m,
     )  # fmt: skip
     rule = Rule(request.k, request.sigma_ahead_m, request.margin_m)
     if request.from_m is None:
@@ -65,14 +75,34 @@ def answer_clearance(request: ClearanceRequest) -> dict[str, Any]:
         replace(hole, wander=_wander(request, described.instrument))
         for hole, described in zip(holes, (mine, theirs), strict=True)
     ]
-    return clearance_result(clearance_between(holes[0], holes[1], request.site.to_site(), rule), request.from_m)
+    needs = magnetic_needs([leg.tool for hole in holes for leg in hole.legs])
+    known = known_site(request.site, FrameRequest(), needs)
+    found = clearance_between(holes[0], holes[1], known.figures.to_site(), rule)
+    warnings = [*_warnings(mine), *_warnings(theirs)]
+    more = {"site": known.row(), "warnings": warning_rows(tuple(warnings))}
+    return clearance_result(found, request.from_m) | more
+
+
+def _record(path: Path, hole: str | None) -> SurveyRecord:
+    """Record of one hole, azimuths from true north."""
+    found = read_any(path, wish=TableWish(hole=hole, north="true"))
+    if found.north not in ("", "true"):
+        raise SurveyError(f"{path}: its azimuths count from {found.north} north; expected true north")
+    return found.record
+
+
+def _warnings(described: _Described) -> tuple[EntryWarning, ...]:
+    """What of a hole is missing or hardly can be."""
+    record, name = described.record, described.name
+    stations = station_warnings(record.md, record.inclination, record.azimuth, name)
+    return (*record.warnings, *stations, *radius_warnings(described.radius, name))
 
 
 def _wander(request: ClearanceRequest, instrument: str) -> LegWander:
     """Curvature of a path that an instrument surveyed."""
     std = request.curvature_sigma_deg_per_m
     if std is None:
-        std = RELAY_CURVATURE_DEG if instrument == "relay" else 0.0
+        std = STATED_CURVATURE_DEG if instrument == "relay" else 0.0
     return LegWander(math.radians(std), request.curvature_length_m)
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from groundstation.entry.quantity_ranges import RANGES
+
 if TYPE_CHECKING:
     from groundstation.survey.well.error_sources import Site
 
@@ -18,18 +20,28 @@ PROGRAMME_ALONE = "--programme: expected neither --azimuth-error-deg nor --expor
 class SiteFigures:
     """The place as a user states it."""
 
-    gravity: float = 9.81  # m/s^2
-    field_nt: float = 50_000.0
-    dip_deg: float = 70.0
-    declination_deg: float = 0.0  # of magnetic from true north
-    latitude_deg: float = 52.0
+    gravity: float | None = None  # m/s^2
+    field_nt: float | None = None
+    dip_deg: float | None = None
+    declination_deg: float | None = None  # of magnetic from true north
+    latitude_deg: float | None = None
+    at: str | None = None  # latitude, longitude, height: what is not stated is worked out there
+    date: str | None = None  # of the magnetic field
+    grid_crs: str | None = None  # national grid, for convergence and scale
 
     def to_site(self) -> Site:
-        """The place in SI and rad."""
+        """The place in SI and rad, of figures that ``known_site`` completed.
+
+        Raises
+        ------
+        SurveyError
+            Names the option that is beyond its range.
+        """
+        names = ("gravity", "field_nt", "dip_deg", "declination_deg", "latitude_deg")
+        values = [RANGES[name].check(f"--{name.replace('_', '-')}", getattr(self, name)) for name in names]
         from groundstation.survey.well.error_sources import Site
 
-        dip, declination, latitude = map(math.radians, (self.dip_deg, self.declination_deg, self.latitude_deg))
-        return Site(self.gravity, self.field_nt, dip, declination, latitude)
+        return Site(*values[:2], *map(math.radians, values[2:]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +52,7 @@ class FrameRequest:
     answer_north: str | None = None
     north_of_site_deg: float | None = None
     convergence_deg: float | None = None
-    declination_deg: float = 0.0
+    declination_deg: float | None = None
     origin: tuple[float, float, float] | None = None  # m, northing, easting, height of the point of zero
     grid_scale_factor: float = 1.0  # metres of the grid a metre on the ground
     depth_reference: str = "collar"
@@ -62,6 +74,8 @@ class SurveyRequest:
     displacement_rule: str = "exact"
     from_collar: bool = False
     md_unit: str | None = None
+    hole: str | None = None  # of a table of several
+    decimal: str | None = None  # ``comma`` or ``point``, where a table may be read as either
     md: tuple[float, ...] = ()  # m, depths at which the position is asked too
     tie_on: Path | None = None
     programme: Path | None = None

@@ -10,6 +10,7 @@ import numpy as np
 from groundstation.survey.well.analysis import Analysis
 from groundstation.survey.well.arcs import on_arc
 from groundstation.survey.well.ellipsoid import hole_axes, plan_ellipse
+from groundstation.survey.well.error_sources import VERTICAL
 from groundstation.survey.well.methods import station_tangents
 
 COORDINATES = ("northing_m", "easting_m", "height_m")
@@ -35,11 +36,16 @@ def station_rows(found: Analysis, sigma: float) -> list[dict[str, Any]]:
                 "closure_m": float(found.closure_distance[k]),
                 "vertical_section_m": float(found.vertical_section[k]),
                 "uncertainty": uncertainty_region(covs[k], sigma)
-                | highside_region(covs[k], sigma, found.record.inclination[k], found.azimuth[k]),
+                | highside_region(covs[k], sigma, found.record.inclination[k], station_bearing(found, k)),
             }
             | ({} if coordinates is None else dict(zip(COORDINATES, coordinates[k], strict=True)))
         )
     return rows
+
+
+def station_bearing(found: Analysis, k: int) -> float:
+    """Azimuth of a station, rad; north where it is vertical, for what a file says there means nothing."""
+    return float(found.azimuth[k]) if math.sin(found.record.inclination[k]) > VERTICAL else 0.0
 
 
 def uncertainty_region(cov: Any, sigma: float) -> dict[str, Any]:

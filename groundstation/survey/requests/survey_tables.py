@@ -6,6 +6,8 @@ import csv
 import io
 from typing import Any
 
+from groundstation.entry.quoted_cells import quoted_cell
+from groundstation.survey.requests.site_place import site_words
 from groundstation.survey.well.analysis import Analysis
 from groundstation.survey.well.reference_frames import ReferenceFrame
 
@@ -31,15 +33,18 @@ def frame_words(frame: ReferenceFrame) -> list[str]:
     return [frame.answer, frame.depths.answer, frame.height_datum]
 
 
-def station_table_text(rows: list[dict[str, Any]], frame: ReferenceFrame) -> str:
-    """Station table, a .csv file; every row names its frame."""
+def station_table_text(rows: list[dict[str, Any]], frame: ReferenceFrame, site: dict[str, Any] | None = None) -> str:
+    """Station table, a .csv file; every row names its frame, and its site where that is given."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     plain = [key for key in rows[0] if key != "uncertainty"]
     half = ("north_m", "east_m", "tvd_m")
     of_grid = [] if frame.grid is None else ["coordinates_north"]
-    writer.writerow([*plain, *(f"uncertainty_{key}" for key in half), *FRAME, *of_grid])
+    of_site = [] if site is None else ["site"]
+    writer.writerow([*plain, *(f"uncertainty_{key}" for key in half), *FRAME, *of_grid, *of_site])
     named = frame_words(frame) + ([] if frame.grid is None else [frame.grid.north])
+    named = [str(quoted_cell(word)) for word in named]
+    named += [] if site is None else [site_words(site).removeprefix("site: ")]
     writer.writerows(
         [[*(row[key] for key in plain), *(row["uncertainty"][key] for key in half), *named] for row in rows]
     )

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.entry.entry_warning import warning_rows
 from groundstation.survey.requests.survey_rows import COORDINATES
 from groundstation.survey.wall.column_deviation import point_deviation
 from groundstation.survey.wall.column_joint import shift_margin
@@ -37,6 +38,8 @@ def wall_result(found: Wall, judgement: Judgement) -> dict[str, Any]:
         "read_from": {"depth_reference": found.file.depths_read_from, "height_m": found.file.reference_height},
         "height_datum": found.file.height_datum or None,
         "coordinates_north": None if found.file.grid is None else found.file.grid.north,
+        "site": wall_site(found),
+        "warnings": warning_rows(found.warnings),
         "findings": [finding_row(finding) for finding in judgement.findings],
         "probability_of_any": judgement.system.probability,
         "probability_of_any_standard_error": judgement.system.standard_error,
@@ -54,6 +57,19 @@ def wall_result(found: Wall, judgement: Judgement) -> dict[str, Any]:
         "voids": void_rows(found, judgement),
         "void_probability": void_probability(found, judgement),
     }
+
+
+def wall_site(found: Wall) -> dict[str, Any]:
+    """The site that errors were computed for; what the file does not state is named by default."""
+    site, stated = found.file.assumed.site, found.file.stated
+    figures = {
+        "gravity_mps2": site.gravity,
+        "field_nt": site.b_field,
+        "dip_deg": math.degrees(site.dip),
+        "declination_deg": math.degrees(site.declination),
+        "latitude_deg": math.degrees(site.latitude),
+    }
+    return figures | {"sources": {key: "stated" if key in stated else "default" for key in figures}}
 
 
 def finding_row(finding: Finding) -> dict[str, Any]:

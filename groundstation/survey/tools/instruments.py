@@ -10,7 +10,6 @@ their value beyond it (``gyro_modes``). Source: ISCWSA error model definition; S
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -27,12 +26,14 @@ from groundstation.survey.tools.formulas import (
     is_zero,
     normalise_name,
 )
+from telemetry.toml_tables import parse_toml_tables
 
 Triple = tuple[str, str, str]
 LARGEST = 1e300
 ZERO: Triple = ("0", "0", "0")
 Window = tuple[float, float]
 EVERYWHERE: Window = (-math.inf, math.inf)
+COMPANION = "-COMPANION"  # ends the name of a companion in a vertical hole: ``across_vertical``
 PREVIOUS = "previous"  # the azimuth weight of the station before, of drift and random walk
 
 
@@ -128,8 +129,8 @@ class SurveyTool:
         return variable.lower() in text
 
     def without(self, *names: str) -> SurveyTool:
-        """Return the tool less the terms of these names."""
-        return self.with_terms(tuple(term for term in self.terms if term.name not in names))
+        """Return the tool less the terms of these names and their companions."""
+        return self.with_terms(tuple(term for term in self.terms if term.name.removesuffix(COMPANION) not in names))
 
     def with_terms(self, terms: tuple[Term, ...]) -> SurveyTool:
         """Return the tool with ``terms`` in place of its own."""
@@ -145,13 +146,23 @@ def shipped_tool_names() -> list[str]:
 def load_tool(name_or_file: str, parameters: Mapping[str, float] | None = None) -> SurveyTool:
     """Tool by its name, of the OWSG set by its name there, or of a TOML or ISCWSA JSON file.
 
-    ``parameters`` are those that it leaves out, or in place of its own.
+    ``parameters`` are those that it leaves out, or in place of its own. Terms that lean a vertical hole one way have
+    a companion across (``across_vertical``), but in the industry's own models.
 
     Raises
     ------
     ToolError
         One line: file, term, what was expected and what came.
     """
+    from groundstation.survey.tools.across_vertical import with_across_terms
+
+    tool = _read_tool(name_or_file, parameters)
+    # the industry's own stay exact to its tables
+    return tool if tool.slot_allowance else with_across_terms(tool)
+
+
+def _read_tool(name_or_file: str, parameters: Mapping[str, float] | None) -> SurveyTool:
+    """The tool as it is published; errors as ``load_tool``."""
     if name_or_file in shipped_tool_names():
         text = (resources.files("groundstation.survey.tools") / "models" / f"{name_or_file}.toml").read_text("utf-8")
         return parse_toml(text, name_or_file, parameters)
@@ -184,8 +195,8 @@ def load_tool(name_or_file: str, parameters: Mapping[str, float] | None = None) 
 def parse_toml(text: str, where: str, replaced: Mapping[str, float] | None = None) -> SurveyTool:
     """Tool of TOML text; errors as ``load_tool``, beginning with ``where``."""
     try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
+        data = parse_toml_tables(text)
+    except ValueError as error:
         raise ToolError(f"{where}: not TOML: {error}") from error
     _keys(where, "", data, {"tool", "parameters", "term"}, {"tool", "term"})
     head = data["tool"]

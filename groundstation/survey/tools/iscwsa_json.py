@@ -22,6 +22,7 @@ from typing import Any
 from groundstation.errors import ToolError
 from groundstation.survey.tools.formulas import normalise_name
 from groundstation.survey.tools.instruments import (
+    COMPANION,
     EVERYWHERE,
     ZERO,
     PropagationMode,
@@ -168,7 +169,7 @@ def to_json(tool: SurveyTool, date: datetime.date) -> str:
     for term in tool.terms:
         if term.by_mode:
             raise ToolError(f"{tool.name}: term {term.name}: the schema has no ranges of a gyro's modes")
-    terms = [_row(tool, term) for term in tool.terms]
+    terms = [_row(tool, term) for term in tool.terms if not term.name.endswith(COMPANION)]
     space = uuid.UUID(NO_UUID)
     metadata: dict[str, Any] = {
         "schema_uuid": NO_UUID,

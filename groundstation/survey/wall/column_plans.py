@@ -12,6 +12,7 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.entry_warning import EntryWarning
 from groundstation.survey.tools.instruments import SurveyTool
 from groundstation.survey.wall.column_deviation import ColumnDesign
 from groundstation.survey.wall.tight_depths import TightRange
@@ -58,6 +59,7 @@ class ColumnSurvey:
     azimuth: Array
     record: dict[str, Array] = field(default_factory=dict)
     covs: Array | None = None
+    warnings: tuple[EntryWarning, ...] = ()  # of values that are missing
 
     def turned(self, angle: float) -> ColumnSurvey:
         """Return the survey counted from another north, from which its own has the azimuth ``angle`` (rad)."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 import tomllib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.entry_warning import EntryWarning
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
 from groundstation.survey.wall.as_built import Columns
@@ -25,19 +26,31 @@ from groundstation.survey.wall.column_joint import largest_distance
 from groundstation.survey.wall.column_plans import Assumptions, ColumnPlan, ColumnSurvey
 from groundstation.survey.wall.tight_depths import TightRange, asked_depths, check_reach, tight_depths
 from groundstation.survey.wall.wall_columns import BuiltWall, build_wall
-from groundstation.survey.wall.wall_frames import FRAMES, NORTH_ANGLES, ORIGIN, PLACE, grid_of, norths_of, place_of
+from groundstation.survey.wall.wall_frames import (
+    FRAMES,
+    NORTH_ANGLES,
+    ORIGIN,
+    PLACE,
+    check_magnetic_site,
+    grid_of,
+    norths_of,
+    place_of,
+)
 from groundstation.survey.wall.wall_joints import Detour, neighbours_in_grid, neighbours_in_line
 from groundstation.survey.wall.wall_layers import MOST_RADIUS_CV, layers_of
+from groundstation.survey.wall.wall_plausibility import wall_warnings
 from groundstation.survey.wall.wall_stations import read_holes
 from groundstation.survey.wall.wall_tables import STRAIGHT, Defaults, Remedy, read_course, read_heads
 from groundstation.survey.well.depth_reference import DEPTHS_FROM
 from groundstation.survey.well.methods import Method
 from groundstation.survey.well.reference_frames import SiteGrid
+from telemetry.toml_tables import parse_toml_tables
 
 if TYPE_CHECKING:
     from groundstation.plan_settings import PlanSettings
 
 Array = npt.NDArray[np.float64]
+SAME_PLACE = 1e-3  # m, within which two designs are one
 LAYOUTS = ("line", "shaft", "grid")
 NEEDED = ("radius_m", "thickness_m", "heads", "stations")
 NAMED = ("project", "client", "calibration", "height_datum")  # of the report alone
@@ -102,6 +115,7 @@ class WallFile:
     grid: SiteGrid | None = None  # site coordinates of positions from the wall's zero
     course: PlanSettings | None = None  # of columns that state no axis of their own
     courses: tuple[Path, ...] = ()  # files of plans
+    stated: dict[str, Any] = field(default_factory=dict)  # figures of the site
 
     def digests(self) -> list[tuple[str, str]]:
         """Name and SHA-256 of each file as it is now."""
@@ -129,6 +143,7 @@ class Wall:
     detours: list[Detour]
     holes: list[ColumnSurvey]
     drilled_on: list[date | None]  # of every column
+    warnings: tuple[EntryWarning, ...] = ()
 
     @property
     def columns(self) -> Columns:
@@ -165,7 +180,7 @@ def read_wall_file(path: Path) -> WallFile:
         One line: file, key, what was expected and what came.
     """
     try:
-        data = tomllib.loads(path.read_text("utf-8"))
+        data = parse_toml_tables(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise SurveyError(f"{path}: {reason}; expected a wall file") from error
@@ -193,7 +208,7 @@ def read_wall_file(path: Path) -> WallFile:
     north, stations_north = norths_of(path, values)
     assumed = Assumptions(
         method,
-        place_of(values),
+        place_of(path, values),
         north,
         values.get("unsurveyed_percent", 1.0) / 100.0,
         values.get("depth_step_m", 0.5),
@@ -233,6 +248,7 @@ def read_wall_file(path: Path) -> WallFile:
         grid_of(path, values, north),
         _course(path, values),
         (path.parent / values["plan"],) if "plan" in values else (),
+        {key: values[key] for key in ("gravity_mps2", "field_nt", "declination_deg", *PLACE) if key in values},
     )
 
 
@@ -279,6 +295,8 @@ def read_wall(path: Path) -> Wall:
     """The whole wall; errors as ``read_wall_file``, of its CSV files with their line."""
     file = read_wall_file(path)
     rows = read_heads(file.heads, file.defaults)
+    if not rows:
+        raise SurveyError(f"{file.heads}: expected at least two columns next to each other, got none")
     courses = dict.fromkeys([*file.courses, *(row.course for row in rows if row.course is not None)])
     file = replace(file, courses=tuple(courses))
     names = [row.name for row in rows]
@@ -290,6 +308,7 @@ def read_wall(path: Path) -> Wall:
             f"{path}: length_m is missing; no column was surveyed, so nothing says how deep they are to go"
         )
     plans = [row.plan(length) for row in rows]
+    check_magnetic_site(path, file.stated, {id(plan.tool): plan.tool for plan in plans}.values())
     try:
         built = build_wall(plans, holes, file.assumed)
     except SurveyError as error:
@@ -297,7 +316,8 @@ def read_wall(path: Path) -> Wall:
     pairs = _pairs(file, [row.remedy for row in rows], built)
     detours = _detours(file.heads, names, [row.remedy for row in rows], pairs)
     _check_design(file, plans, built, pairs, {detour.joint for detour in detours})
-    return Wall(file, plans, built, pairs, detours, holes, [row.drilled_on for row in rows])
+    days = [row.drilled_on for row in rows]
+    return Wall(file, plans, built, pairs, detours, holes, days, wall_warnings(plans, holes, pairs))
 
 
 def _pairs(file: WallFile, remedies: list[Remedy], built: BuiltWall) -> npt.NDArray[np.intp]:
@@ -336,6 +356,15 @@ def _detours(path: Path, names: list[str], remedies: list[Remedy], pairs: npt.ND
     return found
 
 
+def _check_apart(path: Path, columns: Columns) -> None:
+    """Refuse two columns of the design that are one: the second closes nothing. A remedial one may stand in for it."""
+    shown: dict[bytes, str] = {}
+    for name, planned in zip(columns.names, columns.planned, strict=True):
+        other = shown.setdefault(np.round(planned / SAME_PLACE).tobytes(), name)
+        if other != name:
+            raise SurveyError(f"{path}: columns {other} and {name} are one by their design; expected them apart")
+
+
 def _check_design(
     file: WallFile, plans: list[ColumnPlan], built: BuiltWall, pairs: npt.NDArray[np.intp], helped: set[int]
 ) -> None:
@@ -344,6 +373,7 @@ def _check_design(
     ``helped`` : joints that have a way by remedial columns, whose own designs need not reach
     """
     columns = built.columns
+    _check_apart(file.path, columns.subset(np.unique(pairs)))
     alone = pairs[[j for j in range(len(pairs)) if j not in helped]]
     designs = [plan.design for plan in plans]
     try:

@@ -7,21 +7,28 @@ as magnetic north, and are turned. Error models are evaluated from true north. A
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
+from groundstation.survey.tools.instruments import SurveyTool
 from groundstation.survey.well.error_sources import Site
 from groundstation.survey.well.reference_frames import NORTHS, SiteGrid, north_of_coordinates
 
+MAGNETIC = {"field_nt": "BField", "dip_deg": "Dip", "declination_deg": "AzM"}  # variables of formulas
 FRAMES = ("north", "stations_north")
 PLACE = ("dip_deg", "latitude_deg")
 ORIGIN = ("northing_m", "easting_m", "height_m")
 NORTH_ANGLES = {"site": "north_of_site_deg", "grid": "convergence_deg", "magnetic": "declination_deg"}
 
 
-def place_of(values: dict[str, Any]) -> Site:
-    """The place, for error models."""
+def place_of(path: Path, values: dict[str, Any]) -> Site:
+    """The place, for error models; what is stated lies in its range."""
+    for key, name in (("gravity_mps2", "gravity"), ("field_nt", "field_nt"), ("dip_deg", "dip_deg")):
+        if key in values:
+            RANGES[name].check(f"{path}: {key}", values[key])
     usual = Site()
     radians = {key: math.radians(values[key]) for key in (*PLACE, "declination_deg") if key in values}
     return Site(
@@ -31,6 +38,22 @@ def place_of(values: dict[str, Any]) -> Site:
         radians.get("declination_deg", 0.0),
         radians.get("latitude_deg", usual.latitude),
     )
+
+
+def check_magnetic_site(path: Path, values: dict[str, Any], tools: Iterable[SurveyTool]) -> None:
+    """Refuse a magnetic instrument where the field of the site is not stated.
+
+    Raises
+    ------
+    SurveyError
+        Names the instrument and the keys.
+    """
+    for tool in tools:
+        missing = [key for key, variable in MAGNETIC.items() if key not in values and tool.asks_for(variable)]
+        if missing:
+            raise SurveyError(
+                f"{path}: {', '.join(missing)}: missing; the instrument {tool.name} is magnetic and needs its site"
+            )
 
 
 def norths_of(path: Path, values: dict[str, Any]) -> tuple[float, float]:

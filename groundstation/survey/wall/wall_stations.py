@@ -13,8 +13,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.entry_warning import EntryWarning
+from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
-from groundstation.survey.files.survey_records import read_columns
+from groundstation.survey.files.column_tables import read_table_columns
 from groundstation.survey.wall.column_plans import ColumnPlan, ColumnSurvey
 from groundstation.survey.well.analysis import RECORD_COLUMNS
 from groundstation.survey.well.reference_frames import SAME_DEPTH
@@ -39,7 +41,8 @@ def read_holes(path: Path, plans: Sequence[ColumnPlan], heights: list[float]) ->
         Names file, line and column.
     """
     needed = ("column", "md_m", "inclination_deg", "azimuth_deg")
-    table, lines = read_columns(path, needed, texts=("column", *RECORD_COLUMNS, *COVARIANCE))
+    table, lines = read_table_columns(path, needed, texts=("column", *RECORD_COLUMNS, *COVARIANCE))
+    table, lines, missing = _without_missing(table, lines, needed[1:])
     names = [plan.design.name for plan in plans]
     index = {name: k for k, name in enumerate(names)}
     owner = np.array([index.get(str(name), -1) for name in table["column"]], np.intp)
@@ -71,9 +74,28 @@ def read_holes(path: Path, plans: Sequence[ColumnPlan], heights: list[float]) ->
             np.radians(inc[part]),
             np.radians(azi[part]),
             *_told(path, plan, line[part], {name: values[part].tolist() for name, values in cells.items()}),
+            tuple(warning for warning in missing if warning.what == plan.design.name),
         )
         for plan, part in zip(plans, parts, strict=True)
     ]
+
+
+def _without_missing(
+    table: dict[str, Array], lines: list[int], numbers: tuple[str, ...]
+) -> tuple[dict[str, Array], list[int], list[EntryWarning]]:
+    """Rows whose depth and angles are there, and a warning for every other one; a vertical one needs no azimuth."""
+    md, inclination, azimuth = (table[name] for name in numbers)
+    table = table | {numbers[2]: np.where(np.isnan(azimuth) & (inclination == 0.0), 0.0, azimuth)}
+    gone = np.isnan([table[name] for name in numbers])
+    warnings = []
+    for k in np.flatnonzero(gone.any(axis=0)).tolist():
+        name, title = str(table["column"][k]), numbers[int(np.argmax(gone[:, k]))]
+        at = None if np.isnan(md[k]) else float(md[k])
+        where = "" if at is None else f" at {at:g} m"
+        text = f"column {name}, line {lines[k]}: {title} stands for no value: the station{where} is left out"
+        warnings.append(EntryWarning("missing", name, text, at, at))
+    kept = np.flatnonzero(~gone.any(axis=0))
+    return {name: values[kept] for name, values in table.items()}, [lines[k] for k in kept], warnings
 
 
 def _told(
@@ -174,6 +196,9 @@ def _check_depths(
 def _check_values(
     path: Path, line: npt.NDArray[np.intp], md: Array, inclination_deg: Array, azimuth_deg: Array
 ) -> None:
+    turned = np.flatnonzero(np.abs(azimuth_deg) > RANGES["azimuth_deg"].high)
+    if len(turned):
+        RANGES["azimuth_deg"].check(f"{path}: line {line[turned[0]]}: azimuth_deg", float(azimuth_deg[turned[0]]))
     for name, values, good in (
         ("a finite md_m", md, np.isfinite(md)),
         ("an inclination of 0..180 deg", inclination_deg, (inclination_deg >= 0.0) & (inclination_deg <= 180.0)),

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.files.survey_records import read_columns
+from groundstation.survey.files.column_tables import read_table_columns
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
 from groundstation.survey.wall.column_deviation import ColumnDesign, Tolerance, parse_tolerance
 from groundstation.survey.wall.column_plans import ColumnPlan, ColumnStatus
@@ -99,7 +99,7 @@ def read_heads(path: Path, defaults: Defaults) -> list[HeadRow]:
     SurveyError, ToolError
         Names file, line and column.
     """
-    table, lines = read_columns(path, ("column", "north_m", "east_m"), texts=("column", *NUMBERS, *WORDS))
+    table, lines = read_table_columns(path, ("column", "north_m", "east_m"), texts=("column", *NUMBERS, *WORDS))
     names = [str(name) for name in table["column"]]
     seen: dict[str, int] = {}
     for line, name in zip(lines, names, strict=True):

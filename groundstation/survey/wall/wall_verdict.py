@@ -51,6 +51,7 @@ class FindingKind(Enum):
     CROSSING = "crossing"  # two neighbours have changed sides
     DOUBTFUL = "doubtful"  # thick enough as surveyed, too thin with more than the allowed probability
     SYSTEM = "system"  # every joint good, the whole doubtful
+    IMPLAUSIBLE = "implausible"  # a number that is missing, or hardly can be
     DESIGN = "design"  # what is open there would be open as designed
 
 
@@ -100,6 +101,7 @@ def judge_columns(
     detours: Sequence[Detour] = (),
     asked: npt.NDArray[np.bool_] | None = None,
     about: int | None = None,
+    doubts: Sequence[Finding] = (),
 ) -> Judgement:
     """Judge all joints, the plane of a grid, and the whole.
 
@@ -112,6 +114,7 @@ def judge_columns(
     asked : (joints, depths) where a joint is to be tight; where either of its designs is required if not given
     about : the column that is looked at: of others only those that have a joint count as missing, and of a grid only
         voids beside it or where it is to be
+    doubts : findings of what was read
     """
     found = with_detours(columns, judge_joints(columns, pairs, required, asked), detours, required)
     holes: list[VoidFinding] = []
@@ -131,6 +134,7 @@ def judge_columns(
         *_void_findings(columns, holes),
         *_likely_voids(columns, holes, chance, allowed),
         *_crossing_findings(columns, pairs),
+        *doubts,
     ]
     if whole.probability > allowed and not findings:
         text = f"every joint is good, yet anything is open or too thin with a probability of {whole.probability:.2g}"

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.formulas import is_zero
-from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, Term
+from groundstation.survey.tools.instruments import COMPANION, PropagationMode, SurveyTool, Term
 from groundstation.survey.well.compiled_model import locate_stations
 from groundstation.survey.well.error_propagation import Uncertainty
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
@@ -184,7 +184,9 @@ def _tied(record: SurveyRecord, tie_on: TieOn) -> SurveyRecord:
     columns = {name: np.concatenate([values[:1], values[keep]]) for name, values in record.columns.items()}
     if len(md) < 2:
         raise SurveyError(f"tie-on: expected a station below {tie_on.md:g} m, got none")
-    return SurveyRecord(md, inclination, azimuth, [0, *record.lines[keep]], columns, record.of_displacements)
+    return SurveyRecord(
+        md, inclination, azimuth, [0, *record.lines[keep]], columns, record.of_displacements, record.warnings
+    )
 
 
 def legs_of(parts: Sequence[Stretch], md: Array) -> list[Leg]:
@@ -225,7 +227,8 @@ def with_azimuth_error(tool: SurveyTool, azimuth_error: float) -> SurveyTool:
 
 def _turns_azimuth_alone(term: Term) -> bool:
     depth, inclination, azimuth = term.weights
-    return term.position is None and is_zero(depth) and is_zero(inclination) and not is_zero(azimuth)
+    companion = term.name.endswith(COMPANION)  # that of an inclination
+    return not companion and term.position is None and is_zero(depth) and is_zero(inclination) and not is_zero(azimuth)
 
 
 def magnetic_error(inclination: Array, azimuth: Array) -> Array:

@@ -51,25 +51,26 @@ def well(
     parts,
 ):
     north = east = down = 0.0
-    md1, inc1, azi1 = md[0], max(inc[0], TINY), azi[0]
-    si1, ci1, ca1, sa1 = math.sin(inc1), math.cos(inc1), math.cos(azi1), math.sin(azi1)
+    md1, inc1, bearing1 = md[0], max(inc[0], TINY), azi[0]
+    si1, ci1, ca1, sa1 = math.sin(inc1), math.cos(inc1), math.cos(bearing1), math.sin(bearing1)
+    azi1 = 0.0 if inc1 < VERTICAL or inc1 > math.pi - VERTICAL else bearing1
     tx1, ty1, tz1 = si1 * ca1, si1 * sa1, ci1
     mx = my = mz = 0.0
     r0 = r1 = r2 = r3 = r4 = r5 = 0.0
-""".replace("TINY", repr(TINY))
+""".replace("TINY", repr(TINY)).replace("VERTICAL", repr(VERTICAL))
 STRAIGHT, CURVED, GIVEN = 0, 1, 2  # balanced tangential, minimum curvature, positions that were found before
 STEP = (
     """
     for k in range(1, len(md)):
-        md0, inc0, azi0 = md1, inc1, azi1
-        md1, inc1, azi1 = md[k], max(inc[k], TINY), azi[k]
+        md0, inc0, azi0, bearing0 = md1, inc1, azi1, bearing1
+        md1, inc1, bearing1 = md[k], max(inc[k], TINY), azi[k]
         half = 0.5 * (md1 - md0)
         tx0, ty0, tz0 = tx1, ty1, tz1
-        si1, ci1, ca1, sa1 = math.sin(inc1), math.cos(inc1), math.cos(azi1), math.sin(azi1)
+        si1, ci1, ca1, sa1 = math.sin(inc1), math.cos(inc1), math.cos(bearing1), math.sin(bearing1)
         tx1, ty1, tz1 = si1 * ca1, si1 * sa1, ci1
         factor = half
         if path == CURVED:
-            sin_i, sin_a = math.sin(0.5 * (inc1 - inc0)), math.sin(0.5 * (azi1 - azi0))
+            sin_i, sin_a = math.sin(0.5 * (inc1 - inc0)), math.sin(0.5 * (bearing1 - bearing0))
             square = sin_i * sin_i + math.sqrt(tx0 * tx0 + ty0 * ty0) * si1 * sin_a * sin_a
             if square > OPPOSITE:
                 return k
@@ -90,9 +91,12 @@ STEP = (
         mx, my, mz = 0.5 * (tx0 + tx1), 0.5 * (ty0 + ty1), 0.5 * (tz0 + tz1)
         own = 2.0 * half if slot and k == 1 else half
         both = own + (0.5 * (md[k + 1] - md1) if k + 1 < len(md) else 0.0)
+        vertical = inc1 < VERTICAL or inc1 > math.pi - VERTICAL
+        azi1 = bearing1
+        if vertical:  # as ``leaning_azimuth``
+            azi1, ca1, sa1 = 0.0, 1.0, 0.0
         ix, iy, iz = ci1 * ca1, ci1 * sa1, -si1
         ax, ay = -si1 * sa1, si1 * ca1
-        vertical = inc1 < VERTICAL or inc1 > math.pi - VERTICAL
         c0 = c1 = c2 = c3 = c4 = c5 = 0.0
 """.replace("TINY", repr(TINY))
     .replace("VERTICAL", repr(VERTICAL))

@@ -84,9 +84,19 @@ def inputs_of(tool: SurveyTool, site: Site, values: Mapping[str, Any]) -> list[A
     return [known[name] for name in VARIABLES] + list(tool.parameters.values())
 
 
+def leaning_azimuth(survey: WellSurvey) -> Array:
+    """Azimuths (..., n) that errors are weighted by, rad: true north where the hole is vertical and has none.
+
+    The industry's own wells say 0 there. Whatever else a file says would turn the errors of one station against those
+    of the next, and what has no meaning would make a hole look better known.
+    """
+    vertical = np.minimum(survey.inclination, math.pi - survey.inclination) < VERTICAL
+    return np.where(vertical, 0.0, survey.azimuth) if np.any(vertical) else survey.azimuth
+
+
 def station_values(survey: WellSurvey, site: Site) -> dict[str, Array]:
     """Variables of the stations from the second on, each with its predecessor: (..., n - 1)."""
-    md, azimuth = survey.md, survey.azimuth
+    md, azimuth = survey.md, leaning_azimuth(survey)
     inclination = np.maximum(survey.inclination, TINY)
     time = survey.record.get("Time", SECONDS_A_METRE * md)
     magnetic = azimuth - site.declination
@@ -108,7 +118,8 @@ class SurveyGeometry:
 
     def __init__(self, survey: WellSurvey, *, slot_allowance: bool) -> None:
         sine, cosine = np.sin(survey.inclination), np.cos(survey.inclination)
-        cos_a, sin_a = np.cos(survey.azimuth), np.sin(survey.azimuth)
+        azimuth = leaning_azimuth(survey)
+        cos_a, sin_a = np.cos(azimuth), np.sin(azimuth)
         self.upper = 0.5 * np.diff(survey.md, axis=-1)  # weight in the leg above
         self.both = self.upper.copy()  # weight in both legs
         self.both[..., :-1] += self.upper[..., 1:]

@@ -29,6 +29,7 @@ from groundstation.survey.well.error_sources import (
     WellSurvey,
     compile_term_formulas,
     inputs_of,
+    leaning_azimuth,
     station_values,
 )
 
@@ -97,7 +98,7 @@ def _grown(leg: Leg, term: Term, survey: WellSurvey, site: Site, values: Mapping
 def _held(leg: Leg, term: Term, survey: WellSurvey, site: Site, values: Mapping[str, Array]) -> list[Array]:
     """Weights with which the hole last passed the end of the term's range, or with which the leg began beyond it."""
     gate = term.window[1]
-    inclination, azimuth = survey.inclination, survey.azimuth
+    inclination, azimuth = survey.inclination, leaning_azimuth(survey)
     passed = (inclination[..., 1:] > gate) & (inclination[..., :-1] <= gate)
     azimuths = _azimuth_at(gate, inclination, azimuth)
     inclinations = np.full(azimuths.shape, max(gate, TINY))

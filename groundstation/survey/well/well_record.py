@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.entry_warning import EntryWarning
+
 Array = npt.NDArray[np.float64]
 
 
@@ -23,3 +25,4 @@ class SurveyRecord:
     lines: list[int]
     columns: dict[str, Array]
     of_displacements: bool = False
+    warnings: tuple[EntryWarning, ...] = ()  # of values that are missing

@@ -8,6 +8,7 @@ import pytest
 
 from groundstation.errors import SurveyError
 from groundstation.survey.files.field_files import read_any
+from groundstation.survey.files.field_table import TableWish
 
 ROWS = ((0.0, 0.0, 0.0), (100.0, 10.0, 120.5), (250.5, 30.25, 121.0))
 COMMA, SEMI, TABS = "','", "';'", "tabs"
@@ -80,7 +81,7 @@ def test_radians_are_read_where_the_header_says_so(tmp_path: Path) -> None:
 def test_a_depth_without_a_unit_takes_the_one_that_is_given(tmp_path: Path) -> None:
     path = tmp_path / "s.csv"
     path.write_text("MD,Inc,Azi\n0,0,0\n100,1,2\n")
-    assert read_any(path, md_unit="ft").record.md[1] == pytest.approx(30.48)
+    assert read_any(path, wish=TableWish(md_unit="ft")).record.md[1] == pytest.approx(30.48)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +95,7 @@ def test_a_depth_without_a_unit_takes_the_one_that_is_given(tmp_path: Path) -> N
         ("MD;Inc;Azi\n0;0;0\n10,5;1.5;2\n", "'10,5' may be a decimal comma or thousands beside '1.5'"),
         ("MD,Inc,Azi\n0 m,0,0\n10 ft,1,2\n", "line 2: MD = '0 m' has a unit of its own"),
         ("MD (m),Inc (rad),Azi (deg)\n0,0,0\n10,1,2\n", "inclination in rad and azimuth in deg; expected one unit"),
-        ("MD (deg),Inc,Azi\n0,0,0\n10,1,2\n", "MD (deg): expected md in m or ft, got deg"),
+        ("MD (deg),Inc,Azi\n0,0,0\n10,1,2\n", "MD (deg): expected md in m, ft, usft, cm, mm, got deg"),
         ("MD (m),Inc,Azi\nft,deg,deg\n0,0,0\n10,1,2\n", "line 2: ft under a header in m"),
         ("MD,Inc,Azi\n0,0,0\n10,200,2\n", "line 3: expected an inclination of 0..180 deg, got 200"),
         ("MD,Inc,Azi\n0,0,0\n10,x,2\n", "line 3: expected numbers, got Inc = 'x'"),
@@ -114,5 +115,5 @@ def test_a_unit_that_contradicts_the_header_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "s.csv"
     path.write_text("MD (m),Inc,Azi\n0,0,0\n10,1,2\n")
     with pytest.raises(SurveyError, match=r"MD \(m\) is in m, --md-unit says ft"):
-        read_any(path, md_unit="ft")
-    assert math.isclose(read_any(path, md_unit="m").record.md[1], 10.0)
+        read_any(path, wish=TableWish(md_unit="ft"))
+    assert math.isclose(read_any(path, wish=TableWish(md_unit="m")).record.md[1], 10.0)

@@ -88,7 +88,7 @@ def test_coordinates_of_the_sites_own_axes_are_not_turned(tmp_path: Path) -> Non
     [
         (FrameRequest("magnetic", origin=ORIGIN), "count from grid north; expected --convergence-deg beside it"),
         (frame("grid", None, grid_scale_factor=0.0), "grid scale factor: expected metres of the grid a metre on the"),
-        (frame("grid", None, grid_scale_factor=math.nan), "0.9..1.1, got nan"),
+        (frame("grid", None, grid_scale_factor=math.nan), "--grid-scale-factor: expected a finite number, got nan"),
         (frame("grid", None, origin=None), "--grid-scale-factor: expected --origin beside it"),
     ],
 )
@@ -107,6 +107,8 @@ inclination_deg = 12
 azimuth_deg = 77
 length_m = 12
 instrument = "mwd-rev5.1"
+field_nt = 50000
+dip_deg = 70
 """
 
 
@@ -120,6 +122,8 @@ def wall(folder: Path, north: str, stations_north: str, more: str = "") -> Path:
     ]
     (folder / "stations.csv").write_text("column,md_m,inclination_deg,azimuth_deg\n" + "\n".join(rows) + "\n")
     path = folder / "wall.toml"
+    if "declination_deg" not in more and "magnetic" not in (north, stations_north):
+        more += "declination_deg = 0\n"  # what a magnetic instrument is not without
     path.write_text(f'{WALL}north = "{north}"\nstations_north = "{stations_north}"\n{more}')
     return path
 

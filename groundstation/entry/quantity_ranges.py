@@ -1,0 +1,48 @@
+"""Ranges of the quantities that users state: beyond them a number is refused, by its name, its unit and its range."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from groundstation.errors import SurveyError
+
+
+@dataclass(frozen=True, slots=True)
+class QuantityRange:
+    """A quantity: least and largest value in its unit."""
+
+    words: str
+    low: float
+    high: float
+    unit: str
+
+    def check(self, where: str, value: float) -> float:
+        """Return the value where it lies in the range.
+
+        Raises
+        ------
+        SurveyError
+            Beginning with ``where``: what was expected and what came.
+        """
+        if not math.isfinite(value) or not self.low <= value <= self.high:
+            raise SurveyError(
+                f"{where}: expected {self.words} of {self.low:g}..{self.high:g} {self.unit}, got {value:g}"
+            )
+        return value
+
+
+RANGES = {
+    "azimuth_deg": QuantityRange("an azimuth", -720.0, 720.0, "deg"),
+    "inclination_deg": QuantityRange("an inclination", 0.0, 180.0, "deg"),
+    "declination_deg": QuantityRange("a declination", -180.0, 180.0, "deg"),
+    "convergence_deg": QuantityRange("a convergence", -180.0, 180.0, "deg"),
+    "north_of_site_deg": QuantityRange("an azimuth of the site's north", -360.0, 360.0, "deg"),
+    "section_azimuth_deg": QuantityRange("an azimuth", -720.0, 720.0, "deg"),
+    "gravity": QuantityRange("a gravity", 9.0, 10.5, "m/s^2"),
+    "field_nt": QuantityRange("a magnetic field", 15_000.0, 75_000.0, "nT"),
+    "dip_deg": QuantityRange("a dip", -90.0, 90.0, "deg"),
+    "latitude_deg": QuantityRange("a latitude", -90.0, 90.0, "deg"),
+    "longitude_deg": QuantityRange("a longitude", -180.0, 360.0, "deg"),
+    "height_m": QuantityRange("a height", -1000.0, 10_000.0, "m"),
+}

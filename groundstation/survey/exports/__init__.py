@@ -1,0 +1,1 @@
+"""Holes and walls as files of other programs."""

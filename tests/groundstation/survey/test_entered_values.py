@@ -1,0 +1,295 @@
+"""Every number that enters: values that stand for none, ranges, what hardly can be, in surveys and walls."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from groundstation.calibration.calibration_records import read_turn_table
+from groundstation.entry.null_values import is_null, null_or_number
+from groundstation.entry.station_plausibility import station_warnings
+from groundstation.errors import SurveyError
+from groundstation.survey.requests.clearance_answer import answer_clearance
+from groundstation.survey.requests.clearance_request import ClearanceRequest
+from groundstation.survey.requests.survey_answer import answer_survey
+from groundstation.survey.requests.survey_request import FrameRequest, SiteFigures, SurveyRequest
+from groundstation.survey.requests.wall_result import wall_result
+from groundstation.survey.wall.judged_wall import judge_wall, part_around
+from groundstation.survey.wall.wall_file import read_wall
+from groundstation.survey.wall.wall_verdict import FindingKind, WallVerdict
+from telemetry.errors import CalibrationError
+
+HEAD = "MD (m),Inc (deg),Azi (deg)\n"
+NULLS = ("-999.25", "-9999", "-99999", "-999.2500", "1e30", "1E+30", "", "-", "N/A", "null")
+SITE = SiteFigures()
+
+
+def file_of(folder: Path, text: str, name: str = "s.csv") -> Path:
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def answer(folder: Path, text: str, **asked: object) -> dict:
+    return answer_survey(SurveyRequest(file_of(folder, text), **asked)).result
+
+
+@pytest.mark.parametrize("cell", [*NULLS, "9999", "9999.25", "99999"])
+@pytest.mark.parametrize("place", [1, 2])
+def test_a_value_that_stands_for_none_is_missing_and_named(tmp_path: Path, cell: str, place: int) -> None:
+    row = ["20", "3", "40"]
+    row[place] = cell
+    found = answer(tmp_path, f"{HEAD}0,0,0\n10,2,40\n{','.join(row)}\n30,2,40\n")
+    assert [station["md_m"] for station in found["stations"]] == [0.0, 10.0, 30.0]
+    (warning,) = found["warnings"]
+    column = ("MD (m)", "Inc (deg)", "Azi (deg)")[place]
+    assert (warning["kind"], warning["what"], warning["from_m"]) == ("missing", column, 20.0)
+    assert warning["text"] == (f"line 4: {column} = {cell!r} stands for no value, at 20: the station is left out")
+
+
+@pytest.mark.parametrize("cell", NULLS)
+def test_a_depth_that_stands_for_none_is_missing_too(tmp_path: Path, cell: str) -> None:
+    found = answer(tmp_path, f"{HEAD}0,0,0\n{cell},2,40\n30,2,40\n")
+    assert [station["md_m"] for station in found["stations"]] == [0.0, 30.0]
+    assert found["warnings"][0]["what"] == "MD (m)"
+
+
+def test_a_depth_of_9999_m_is_a_depth_and_an_angle_is_not() -> None:
+    assert not is_null(9999.0)
+    assert is_null(9999.0, angle=True)
+    assert null_or_number(" 12.5 ") == 12.5
+    assert null_or_number("") is None
+
+
+def test_a_vertical_station_does_not_miss_its_azimuth(tmp_path: Path) -> None:
+    found = answer(tmp_path, f"{HEAD}0,0,-999.25\n10,0,\n20,2,40\n")
+    assert len(found["stations"]) == 3
+    assert found["warnings"] == []
+
+
+@pytest.mark.parametrize(
+    ("row", "named"),
+    [
+        ("20,2,1005", "line 4: azimuth_deg: expected an azimuth of -720..720 deg, got 1005"),
+        ("20,2,-721", "line 4: azimuth_deg: expected an azimuth of -720..720 deg, got -721"),
+        ("20,181,40", "line 4: expected an inclination of 0..180 deg, got 181"),
+        ("20,-1,40", "line 4: expected an inclination of 0..180 deg, got -1"),
+    ],
+)
+def test_an_angle_beyond_its_range_is_refused_with_line_column_and_unit(tmp_path: Path, row: str, named: str) -> None:
+    with pytest.raises(SurveyError) as error:
+        answer(tmp_path, f"{HEAD}0,0,0\n10,2,40\n{row}\n30,2,40\n")
+    assert named in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("asked", "named"),
+    [
+        ({"site": SiteFigures(declination_deg=900)}, "--declination-deg: expected a declination of -180..180 deg"),
+        ({"frame": FrameRequest(declination_deg=900)}, "--declination-deg: expected a declination of -180..180 deg"),
+        ({"site": SiteFigures(dip_deg=91)}, "--dip-deg: expected a dip of -90..90 deg, got 91"),
+        ({"site": SiteFigures(gravity=981)}, "--gravity: expected a gravity of 9..10.5 m/s^2, got 981"),
+        ({"site": SiteFigures(field_nt=50)}, "--field-nt: expected a magnetic field of 15000..75000 nT, got 50"),
+        ({"site": SiteFigures(latitude_deg=520)}, "--latitude-deg: expected a latitude of -90..90 deg, got 520"),
+        ({"site": SiteFigures(latitude_deg=math.nan)}, "--latitude-deg: expected a latitude of -90..90 deg, got nan"),
+        ({"frame": FrameRequest(convergence_deg=400)}, "--convergence-deg: expected a convergence of -180..180 deg"),
+        ({"frame": FrameRequest(north_of_site_deg=1e4)}, "--north-of-site-deg: expected an azimuth of the site's"),
+        ({"section_azimuth_deg": 9999.0}, "--section-azimuth-deg: expected an azimuth of -720..720 deg, got 9999"),
+    ],
+)
+def test_a_figure_of_the_site_beyond_its_range_is_refused(tmp_path: Path, asked: dict, named: str) -> None:
+    with pytest.raises(SurveyError) as error:
+        answer(tmp_path, f"{HEAD}0,0,0\n10,2,40\n", **asked)
+    assert named in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("rows", "kind"),
+    [
+        ("30,12,90\n60,123,90\n90,12.4,90\n", "spike"),  # a decimal point
+        ("30,12,90\n60,12.1,901\n90,12.4,90\n", None),  # beyond its range
+        ("30,12,90\n60,12.1,270\n90,12.4,90\n", "spike"),  # north and south
+        ("30,12,90\n60,12.2,90\n90,124,90\n", "dogleg"),  # at the toe
+        ("0.5,1,90\n1,12,90\n1.5,12,90\n", "dogleg"),
+        ("30,12,90\n60,30,90\n90,50,90\n", None),  # steered
+    ],
+)
+def test_what_steel_hardly_does_is_a_warning(tmp_path: Path, rows: str, kind: str | None) -> None:
+    text = f"{HEAD}0,0,0\n{rows}"
+    if "901" in rows:
+        with pytest.raises(SurveyError):
+            answer(tmp_path, text)
+        return
+    found = answer(tmp_path, text)["warnings"]
+    assert [warning["kind"] for warning in found] == ([] if kind is None else [kind])
+    assert all("deg" in warning["text"] for warning in found)
+
+
+@given(st.lists(st.tuples(st.floats(0.2, 30.0), st.floats(-1.0, 1.0), st.floats(0.0, 360.0)), min_size=2, max_size=30))
+def test_a_hole_that_bends_as_steel_does_has_no_warning(steps: list[tuple[float, float, float]]) -> None:
+    md = np.cumsum([0.0, *(length for length, _, _ in steps)])
+    inc = np.abs(np.cumsum([0.0, *(0.9 * length * bend for length, bend, _ in steps)]))
+    inc = np.radians(np.minimum(inc, 360.0 - inc) % 180.0 if inc.max() > 180.0 else inc)
+    if inc.max() <= math.pi and np.all(np.abs(np.diff(inc)) <= np.radians(np.diff(md))):
+        assert not [w for w in station_warnings(md, inc, np.full(len(md), 1.0), "h") if w.kind == "dogleg"]
+
+
+@pytest.mark.parametrize("words", [(), ("hole",)])
+def test_two_holes_in_one_table_are_a_choice(tmp_path: Path, words: tuple[str, ...]) -> None:
+    name = "hole" if words else "what"
+    text = f"{name},MD,Inc,Azi\nA,0,0,0\nA,10,2,40\nB,20,2,40\nB,30,3,50\n"
+    with pytest.raises(SurveyError, match=rf"{name} tells 2 holes apart: A, B; expected --hole with one of them"):
+        answer(tmp_path, text)
+    assert [s["md_m"] for s in answer(tmp_path, text, hole="A")["stations"]] == [0.0, 10.0]
+    assert len(answer(tmp_path, text, hole="*")["stations"]) == 4
+    with pytest.raises(SurveyError, match="--hole C: expected one of its holes, A, B"):
+        answer(tmp_path, text, hole="C")
+
+
+def test_holes_that_have_numbers_are_a_choice_too_and_remarks_are_none(tmp_path: Path) -> None:
+    with pytest.raises(SurveyError, match="hole tells 2 holes apart: 1, 2"):
+        answer(tmp_path, "hole,MD,Inc,Azi\n1,0,0,0\n1,10,2,40\n2,20,2,40\n")
+    found = answer(tmp_path, "MD,Inc,Azi,Remarks\n0,0,0,begun\n10,2,40,\n20,2,40,wet\n")
+    assert (len(found["stations"]), found["warnings"]) == (3, [])
+
+
+def test_a_text_that_differs_beside_the_chosen_hole_is_named(tmp_path: Path) -> None:
+    text = "hole,tool,MD,Inc,Azi\nA,gyro,0,0,0\nA,probe,10,2,40\nB,probe,20,2,40\n"
+    (warning,) = answer(tmp_path, text, hole="A")["warnings"]
+    assert (warning["kind"], "tool differs" in warning["text"]) == ("unread", True)
+
+
+GOOD = "".join(f"{name},{md},0.1,40\n" for name in "ABC" for md in (0, 5, 10))
+HEADS = "column,north_m,east_m\nA,0,0\nB,0,0.7\nC,0,1.4\n"
+
+
+def wall_of(folder: Path, stations: str = GOOD, heads: str = HEADS, more: str = "") -> Path:
+    file_of(folder, heads, "heads.csv")
+    file_of(folder, "column,md_m,inclination_deg,azimuth_deg\n" + stations, "stations.csv")
+    return file_of(
+        folder,
+        f'radius_m = 0.6\nthickness_m = 0.8\nlength_m = 10\nheads = "heads.csv"\nstations = "stations.csv"\n{more}',
+        "wall.toml",
+    )
+
+
+def test_a_wall_without_a_warning_is_tight(tmp_path: Path) -> None:
+    wall = read_wall(wall_of(tmp_path))
+    judgement = judge_wall(wall)
+    assert (judgement.verdict, wall.warnings) == (WallVerdict.TIGHT, ())
+    assert wall_result(wall, judgement)["warnings"] == []
+
+
+@pytest.mark.parametrize("cell", ["-999.25", "9999", "1e30", ""])
+def test_a_null_in_a_column_is_not_surveyed_and_the_wall_not_tight(tmp_path: Path, cell: str) -> None:
+    wall = read_wall(wall_of(tmp_path, GOOD.replace("B,5,0.1,40", f"B,5,0.1,{cell}")))
+    judgement = judge_wall(wall)
+    assert judgement.verdict is WallVerdict.NOT_PROVEN
+    assert [f.kind for f in judgement.findings] == [FindingKind.IMPLAUSIBLE]
+    assert "column B, line 6: azimuth_deg stands for no value: the station at 5 m" in judgement.findings[0].text
+    (row,) = wall_result(wall, judgement)["warnings"]
+    assert (row["kind"], row["what"], row["from_m"]) == ("missing", "B", 5.0)
+
+
+def test_a_column_of_nulls_is_not_surveyed_at_all(tmp_path: Path) -> None:
+    text = "".join(line if line[0] != "B" else line.replace(",40", ",-999.25") for line in GOOD.splitlines(True))
+    judgement = judge_wall(read_wall(wall_of(tmp_path, text)))
+    assert judgement.verdict is WallVerdict.NOT_TIGHT
+    assert {f.kind for f in judgement.findings} >= {FindingKind.MISSING, FindingKind.IMPLAUSIBLE}
+
+
+@pytest.mark.parametrize(
+    ("change", "kind"),
+    [
+        ({"stations": GOOD.replace("B,10,0.1,40", "B,10,45,40")}, "lean"),
+        ({"stations": GOOD.replace("B,10,0.1,40", "B,10,0.1,40\nB,10000,0.1,40")}, "depth"),
+        ({"heads": "column,north_m,east_m,radius_m\nA,0,0,\nB,0,0.7,60\nC,0,1.4,\n"}, "radius"),
+        ({"heads": "column,north_m,east_m,radius_m\nA,0,0,\nB,0,0.7,2\nC,0,1.4,\n"}, "radius"),
+        ({"stations": GOOD.replace("B,10,0.1,40", "B,10,8.9,40")}, "dogleg"),
+        ({"stations": GOOD.replace("B,5,0.1,40", "B,5,8.9,40")}, "spike"),
+    ],
+)
+def test_a_wall_with_a_warning_that_touches_its_verdict_is_not_tight(tmp_path: Path, change: dict, kind: str) -> None:
+    wall = read_wall(wall_of(tmp_path, **change))
+    judgement = judge_wall(wall)
+    assert judgement.verdict is not WallVerdict.TIGHT
+    assert kind in {warning.kind for warning in wall.warnings}
+    texts = {finding.text for finding in judgement.findings if finding.kind is FindingKind.IMPLAUSIBLE}
+    assert texts == {warning.text for warning in wall.warnings}
+    part, place = part_around(wall, 0)
+    assert judge_wall(part, place).verdict is not WallVerdict.TIGHT
+
+
+def test_a_warning_below_what_is_to_be_tight_is_named_and_touches_nothing(tmp_path: Path) -> None:
+    stations = GOOD.replace("B,10,0.1,40", "B,10,0.1,40\nB,11,0.1,40\nB,12,9,40")
+    wall = read_wall(wall_of(tmp_path, stations, more="tight_from_m = 0\ntight_to_m = 8\n"))
+    assert [warning.kind for warning in wall.warnings] == ["dogleg"]
+    assert judge_wall(wall).verdict is WallVerdict.TIGHT
+
+
+def test_a_clearance_names_what_hardly_can_be(tmp_path: Path) -> None:
+    one = file_of(tmp_path, f"{HEAD}0,0,0\n30,12,90\n60,123,90\n90,12.4,90\n", "one.csv")
+    two = file_of(tmp_path, f"{HEAD}0,0,0\n30,12,90\n60,-999.25,90\n90,12.4,90\n", "two.csv")
+    found = answer_clearance(ClearanceRequest(one, two, offset_head=(50.0, 0.0, 0.0), radius_m=60.0))
+    assert [row["kind"] for row in found["warnings"]] == ["spike", "radius", "missing"]
+    json.dumps(found)
+
+
+def test_a_calibration_refuses_what_stands_for_no_reading(tmp_path: Path) -> None:
+    text = "axis,x_pos,x_neg,y_pos,y_neg,z_pos,z_neg\nx,200,-200,0,0,0,0\ny,0,0,200,-999.25,0,0\nz,0,0,0,0,200,-200\n"
+    with pytest.raises(CalibrationError, match=r"s\.csv, line 3: expected a reading in column y_neg, got -999\.25"):
+        read_turn_table(file_of(tmp_path, text), 200.0)
+
+
+FIGURES = ("md_m", "inclination_deg", "north_m", "east_m", "tvd_m", "closure_m", "uncertainty")
+
+
+def figures(found: dict) -> list:
+    return [[station[key] for key in FIGURES] for station in found["stations"]]
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(-360.0, 360.0), st.sampled_from(["relay", "mwd-rev5.1", "ipst-rqh"]), st.integers(-1, 1))
+def test_an_answer_does_not_depend_on_what_means_nothing(
+    tmp_path_factory: pytest.TempPathFactory, azimuth: float, tool: str, turns: int
+) -> None:
+    """The azimuth of a vertical station, whole turns, the order of the columns and the unit of the file."""
+    folder = tmp_path_factory.mktemp("same")
+    rows = [(0.0, 0.0, azimuth), (30.48, 0.0, azimuth), (60.96, 3.0, 40.0), (91.44, 5.0, 350.0)]
+    asked = {"instrument": tool}
+    plain = answer(folder, HEAD + "".join(f"{m},{i},{a if i else 0.0}\n" for m, i, a in rows), **asked)
+    turned = answer(folder, HEAD + "".join(f"{m},{i},{a + 360 * turns if i else a}\n" for m, i, a in rows), **asked)
+    other = "Azi (deg),Inc (deg),MD (ft)\n" + "".join(f"{a},{i},{m / 0.3048}\n" for m, i, a in rows)
+    for found in (turned, answer(folder, other, **asked)):
+        np.testing.assert_allclose(flat(figures(found)), flat(figures(plain)), rtol=1e-9, atol=1e-9)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(-30.0, 30.0), st.sampled_from(["relay", "mwd-rev5.1", "ipst-rqh"]))
+def test_the_frame_of_the_file_changes_nothing_of_a_hole(
+    tmp_path_factory: pytest.TempPathFactory, convergence: float, tool: str
+) -> None:
+    folder = tmp_path_factory.mktemp("frame")
+    rows = [(0.0, 0.0, 0.0), (30.0, 0.0, 0.0), (60.0, 3.0, 40.0), (90.0, 5.0, 350.0)]
+    true, grid = (HEAD + "".join(f"{m},{i},{a - turn}\n" for m, i, a in rows) for turn in (0.0, convergence))
+    frames = (
+        FrameRequest(north="true", answer_north="true", convergence_deg=convergence),
+        FrameRequest(north="grid", answer_north="true", convergence_deg=convergence),
+    )
+    one, other = (
+        answer(folder, text, instrument=tool, frame=frame) for text, frame in zip((true, grid), frames, strict=True)
+    )
+    np.testing.assert_allclose(flat(figures(one)), flat(figures(other)), rtol=1e-8, atol=1e-9)
+
+
+def flat(value: object) -> list[float]:
+    """All numbers, but the direction of an ellipse that is a circle."""
+    if isinstance(value, dict):
+        return [x for key, part in value.items() if key != "azimuth_deg" for x in flat(part)]
+    if isinstance(value, list):
+        return [x for part in value for x in flat(part)]
+    return [float(value)]  # type: ignore[arg-type]
