@@ -14,7 +14,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts bounds kernels kernels-of-floats kernels-of-integers bytecode browser fast tests statistical truth explore lock study studies soak seeds clean test-socketcan test-compose
+.PHONY: help rig test quick check lint types contracts bounds kernels kernels-of-floats kernels-of-integers bytecode browser fast tests planted statistical truth explore lock study studies soak seeds clean test-socketcan test-firmware test-compose
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-20s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -86,6 +86,9 @@ statistical: kernels  ## the statistical tests at full size, properties with mor
 truth: $(STAMP)  ## the table of the field by a second world, beside the study's
 	PYTHONPATH=tests/truth $(BIN)/python tests/truth/both_tables.py 100
 
+planted: kernels  ## plant every listed defect, one at a time, and see whether the tests notice
+	nice -n 10 $(BIN)/python tests/planted/run_planted.py $(PLANT)
+
 explore: $(STAMP)  ## the properties with examples that no run before has seen
 	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest -m hypothesis
 
@@ -93,6 +96,7 @@ study: $(STAMP)  ## statistical tests, and every study with many seeds: its tabl
 	$(MAKE) --jobs=2 --output-sync=line statistical studies
 	$(BIN)/borechain bench realtime --nodes 50 --seconds 120 --out docs/results
 	$(BIN)/python -P benchmarks/codec.py
+	nice -n 10 $(BIN)/python tests/planted/run_planted.py --sample 40
 	$(BIN)/python docs/make_faults.py
 
 # what the tests leave of the cores, the studies use; they are in no test's way
@@ -109,6 +113,10 @@ seeds: $(STAMP)  ## fresh seeds of the gauntlet, SEEDS of them FROM one on
 
 test-socketcan: $(STAMP)  ## joints on the kernel's own CAN, in a User-Mode Linux; says why where there is none
 	$(BIN)/python tests/tools/socketcan.py
+
+test-firmware: $(STAMP)  ## the step in C on this machine and on emulated chips; installs Debian's compilers and emulators, or says why not
+	$(PYTHON) tests/tools/install_compilers.py
+	$(PYTEST) --timeout 1800 tests/node/chip tests/test_firmware_command.py
 
 test-compose: $(STAMP)  ## docker-compose.yml in containers until two tubes are surveyed; says why where that cannot be
 	$(BIN)/python tests/tools/compose.py $(COLD)

@@ -50,6 +50,7 @@ COMMANDS = {
     ),
     "export": ("borechain.cli.export.export_command", "export", "Write a hole or a wall as a file of other programs."),
     "link": ("borechain.cli.link.link", "link", "Between tubes: radio through soil and pipe, load of a CAN bus."),
+    "firmware": ("borechain.cli.firmware.firmware", "firmware", "The step of a node in C, for a chip."),
     "bench": ("borechain.cli.bench.bench", "bench", "Measure speed side by side with other libraries."),
     "campaign": (
         "borechain.cli.campaign.campaign",

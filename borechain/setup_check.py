@@ -13,15 +13,17 @@ from groundstation.service.alarms.verdict_words import VerdictDoubt
 if TYPE_CHECKING:
     from borechain.client import Ground
 
-LATER = (VerdictDoubt.NO_SURVEY, VerdictDoubt.UNCERTAIN, VerdictDoubt.SETUP)  # surveys mend them, or they are named
+# surveys mend them, or they are named
+LATER = (VerdictDoubt.NO_SURVEY, VerdictDoubt.UNCERTAIN, VerdictDoubt.SETUP, VerdictDoubt.UNCHECKED)
 
 
 @dataclass(frozen=True, slots=True)
 class SetupCheck:
-    """The answer: what is missing by name, what else is wrong, what to do next, what no sigma holds, and all items."""
+    """The answer: what is missing and what nothing checks by name, what else is wrong, what to do next, all items."""
 
     ready: bool
     missing: list[str]
+    unchecked: list[str]
     wrong: list[str]
     todo: str
     left_out: str
@@ -81,11 +83,13 @@ def check_settings(settings: dict[str, Any], joints: dict[int, tuple[bool, bool]
     for tube, (drive, lower) in (joints or {}).items():
         untold = NodeFlag(0) if drive else NodeFlag.DRIVE_UNTOLD
         model.setup.on_flags(tube, 1, untold if lower else untold | NodeFlag.LOWER_UNTOLD)  # each hangs from it once
-    return check_of(find_path(model, "setup").show(model, {}), [])
+    setup = find_path(model, "setup").show(model, {})
+    return check_of(setup, setup["contradicted"])
 
 
 def check_of(setup: dict[str, Any], wrong: list[str]) -> SetupCheck:
     """The check by the answer of a ground station, and by what else is wrong."""
     return SetupCheck(
-        setup["ready"] and not wrong, setup["missing"], wrong, setup["todo"], setup["left_out"], setup["items"]
-    )
+        setup["ready"] and not wrong, setup["missing"], setup["unchecked"], wrong, setup["todo"], setup["left_out"],
+        setup["items"],
+    )  # fmt: skip

@@ -13,6 +13,7 @@ from groundstation.errors import ConfigurationError, SurveyError
 from groundstation.plan_settings import PlanSettings
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.path.leg_wander import LegWander
+from groundstation.survey.path.stated_curvature import STATED_CURVATURE_DEG, STATED_LENGTH
 from groundstation.survey.wall.column_deviation import ColumnDesign, parse_tolerance
 from groundstation.survey.well.depth_errors import DepthErrors
 from telemetry import keys
@@ -67,6 +68,10 @@ class GroundConfig(BaseModel):
     )
     stick_up_m: float = Field(0.0, description="of the zero of the depth over the collar")
     stick_up_std_m: Positive | None = None
+    north_check_deg: float | None = Field(None, description="a second bearing of the encoder's zero, taken by itself")
+    north_check_std_deg: Positive | None = None
+    stick_up_check_m: float | None = Field(None, description="a second reading of it: the bit at the collar's edge")
+    stick_up_check_std_m: Positive | None = None
     mount_tilt_std_deg: Positive | None = Field(
         None, description="of an IMU against its tube's axis until it is aligned; as mounted, 0.5, if absent"
     )
@@ -74,8 +79,10 @@ class GroundConfig(BaseModel):
         Weighting.ADJUSTED, description="how the readings of one station count, or all of the hole in one adjustment"
     )
     play_std_deg: Positive = Field(0.01, description="of a tube against the hole at a stop, until the looks tell it")
-    curvature_std_deg_per_m: Positive = Field(0.3, description="of the hole's curvature, before the looks")
-    curvature_length: Positive = Field(20.0, description="m, over which a curvature is forgotten")
+    curvature_std_deg_per_m: Positive = Field(
+        STATED_CURVATURE_DEG, description="of the hole's curvature, before the looks"
+    )
+    curvature_length: Positive = Field(STATED_LENGTH, description="m, over which a curvature is forgotten")
     target: Positive = Field(30.0, description="m, length of the design axis")
     design_inclination_deg: float = Field(0.0, ge=0.0, le=180.0)
     design_azimuth_deg: float = 0.0
@@ -114,6 +121,9 @@ class GroundConfig(BaseModel):
         for name, is_told in told.items():
             if is_told and getattr(self, name) is None:
                 raise PydanticCustomError("told", "expected {name} beside the value that it is of", {"name": name})
+        for value, std in (("north_check_deg", "north_check_std_deg"), ("stick_up_check_m", "stick_up_check_std_m")):
+            if (getattr(self, value) is None) != (getattr(self, std) is None):
+                raise PydanticCustomError("check", "expected {value} and {std} together", {"value": value, "std": std})
         return self
 
     @property

@@ -11,16 +11,17 @@ from functools import partial
 from typing import Any
 
 from groundstation.config import GroundConfig, checked_config
-from groundstation.gateway.lease import take_lease
+from groundstation.gateway.lease import RigLease
+from groundstation.gateway.leased_process import LeasedProcess
 from groundstation.gateway.page.page_settings import PageSettings, open_page_socket
 from groundstation.gateway.zenoh import ZenohGateway
 from groundstation.service.hole.blunder_search import RunApart
 from groundstation.service.process.ground_process import GroundProcess
 from node.kernels.arithmetic.formats import PERIOD
 from telemetry import keys
-from telemetry.media.credentials import file_name
+from telemetry.media.credentials import credentials_for, file_name
 from telemetry.media.neighbours import neighbour_ports, stepped_ports
-from telemetry.media.zenoh_bus import ZenohBus
+from telemetry.media.zenoh_bus import ZenohBus, open_client
 from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import BASE, ENCODER, Side, address_name
 from telemetry.runtime.event_loop import run_event_loop, stop_on_signals
@@ -30,6 +31,7 @@ from telemetry.runtime.step_client import AsyncStepClient, serve_stepped
 from telemetry.runtime.timing import CycleTiming
 
 NAME = "ground"
+ONE_TRY = 2.0  # wall s, to join a router for a question
 ServePage = Callable[[GroundProcess], contextlib.AbstractAsyncContextManager[None]]
 OpenGateways = Callable[[], contextlib.AbstractAsyncContextManager["asyncio.Task[None]"]]
 
@@ -58,15 +60,20 @@ def run_ground(
             contextlib.closing(start_ground_process(config, run_on_thread if own_clock else None)) as process,
             page_of(page) as serve_page,
             rig_session(place, file_name(BASE)) as bus,
+            contextlib.closing(RigLease(bus, place.rig, partial(fresh_session, place))) as lease,
         ):
             warn_of_keys(NAME, process.endpoint.seals)
-            take_lease(bus, place.rig)
             open_gateways = partial(answering_operators, process, bus, serve_page)
             run_event_loop(
-                serve_by_own_clock(process, bus, open_gateways)
+                serve_by_own_clock(process, bus, open_gateways, lease)
                 if own_clock
                 else serve_on_stepper(process, bus, place, open_gateways)
             )
+
+
+def fresh_session(place: Place) -> contextlib.AbstractContextManager[ZenohBus]:
+    """One more session with the router, for a question."""
+    return open_client(place.endpoint, ONE_TRY, credentials_for(place.endpoint, place.keys, file_name(BASE)))
 
 
 def load_kernels() -> None:
@@ -105,12 +112,16 @@ def no_page(_process: GroundProcess) -> contextlib.AbstractAsyncContextManager[N
     return contextlib.nullcontext()
 
 
-async def serve_by_own_clock(process: GroundProcess, bus: ZenohBus, open_gateways: OpenGateways) -> None:
+async def serve_by_own_clock(
+    process: GroundProcess, bus: ZenohBus, open_gateways: OpenGateways, lease: RigLease
+) -> None:
     """Run the ground station by its own clock, below it the encoder, until a signal ends it."""
     rig = process.config.rig
     async with open_gateways() as answers:
         ports = neighbour_ports(ZenohMedium(bus), rig, BASE, {Side.LOWER: ENCODER})
-        loop = OwnClockLoop(process, ports, OwnClock(), CycleTiming(), PERIOD, partial(write_warning, NAME))
+        lease.watch()
+        leased = LeasedProcess(process, lease)
+        loop = OwnClockLoop(leased, ports, OwnClock(), CycleTiming(), PERIOD, partial(write_warning, NAME))
         process.operator.wake = lambda: loop.call(lambda woken, now: woken.on_timer(now))
         bus.subscribe(keys.DEPTH.format(rig=rig), partial(hear_depth, loop))
         end_with(answers, loop.stop)

@@ -32,12 +32,16 @@ class GroundRequest:
     string_transport: str
     north_deg: float
     north_std_deg: float | None
+    north_check_deg: float | None
+    north_check_std_deg: float | None
     collar_inclination_deg: float | None
     collar_azimuth_deg: float | None
     collar_std_deg: float | None
     joints: tuple[tuple[str, float, float], ...]
     stick_up_m: float
     stick_up_std_m: float | None
+    stick_up_check_m: float | None
+    stick_up_check_std_m: float | None
     mount_tilt_std_deg: float | None
     weighting: str
     accelerometer_bias_std_deg: float
@@ -60,9 +64,13 @@ class GroundRequest:
             "string_transport": self.string_transport,
             "north_deg": self.north_deg,
             "north_std_deg": self.north_std_deg,
+            "north_check_deg": self.north_check_deg,
+            "north_check_std_deg": self.north_check_std_deg,
             "joints": self.joints,
             "stick_up_m": self.stick_up_m,
             "stick_up_std_m": self.stick_up_std_m,
+            "stick_up_check_m": self.stick_up_check_m,
+            "stick_up_check_std_m": self.stick_up_check_std_m,
             "mount_tilt_std_deg": self.mount_tilt_std_deg,
             "collar_inclination_deg": self.collar_inclination_deg,
             "collar_azimuth_deg": self.collar_azimuth_deg,
@@ -127,6 +135,10 @@ ground_options = gather_options(
         "--north-std-deg", type=POSITIVE, help="Standard error of --north-deg. Without it no azimuth is known."
     ),
     click.option(
+        "--north-check-deg", type=float, help="A second bearing of the encoder's zero. Without it north is not checked."
+    ),
+    click.option("--north-check-std-deg", type=POSITIVE, help="Standard error of --north-check-deg."),
+    click.option(
         "--collar-inclination-deg",
         type=click.FloatRange(0.0, 180.0, max_open=True),
         help="Of the hole at the collar, where the head holds the string  [default: as the design]",
@@ -147,6 +159,8 @@ ground_options = gather_options(
     ),
     click.option("--stick-up-m", type=float, default=0.0, show_default=True, help="Zero of the depth over the collar."),
     click.option("--stick-up-std-m", type=POSITIVE, help="Standard error of --stick-up-m. Not told it is 0.1."),
+    click.option("--stick-up-check-m", type=float, help="A second reading of it, the bit at the collar's edge."),
+    click.option("--stick-up-check-std-m", type=POSITIVE, help="Standard error of --stick-up-check-m."),
     click.option(
         "--mount-tilt-std-deg",
         type=POSITIVE,

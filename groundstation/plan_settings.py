@@ -15,6 +15,7 @@ from groundstation.errors import SurveyError
 from groundstation.survey.files.survey_records import read_stations
 from groundstation.survey.wall.column_deviation import Tolerance, parse_tolerance
 from groundstation.survey.well.well_plan import PlanLeg, WellPlan
+from telemetry.toml_tables import parse_toml_tables
 
 SAME = 1e-6  # m and deg
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -164,7 +165,7 @@ def read_plan(path: Path) -> PlanSettings:
 
 def _read_legs(path: Path) -> PlanSettings:
     try:
-        return PlanSettings(**tomllib.loads(path.read_text("utf-8")))
+        return PlanSettings(**parse_toml_tables(path.read_text("utf-8")))
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise SurveyError(f"{path}: {reason}; expected a plan") from error

@@ -52,6 +52,7 @@ WAITS_S = {  # roughly how long a file waits, of those that wait for more than t
     "test_calibration_commands.py": 45,
     "groundstation/test_process.py": 30,
     "page/test_looks.py": 30,
+    "page/test_drawn_coordinates.py": 10,
     "processes/test_bench_hour.py": 30,
     "processes/test_keys.py": 25,
     "processes/test_log.py": 25,

@@ -277,18 +277,16 @@ def test_what_is_no_record_is_refused_with_its_line_and_nothing_is_written(
     assert list(folder.iterdir()) == []
 
 
-def test_a_static_record_that_moved_is_short_or_is_not_finite_is_refused(static: np.ndarray, tmp_path: Path) -> None:
+def test_a_static_record_that_moved_is_short_or_saturated_is_refused(static: np.ndarray, tmp_path: Path) -> None:
     path, out = tmp_path / "static.npy", tmp_path / "allan.json"
-    moved, broken, stuck = static.copy(), static.copy(), static.copy()
+    moved, stuck = static.copy(), static.copy()
     moved[60_000:, 1] += 0.5
-    broken[77, 2] = np.nan
     stuck[:, 0] = np.clip(stuck[:, 0], -0.05, 0.05)
     cases = (
         (moved, "moved"),
-        (broken, "line 78: expected a finite number in column z"),
         (stuck, "axis x is saturated"),
         (static[:2000], "too short"),
-        (static[:, :2], "shape (n, 3)"),
+        (static[:, :2], "expected names of its 2 columns"),
     )
     for samples, reason in cases:
         np.save(path, samples)
@@ -296,6 +294,83 @@ def test_a_static_record_that_moved_is_short_or_is_not_finite_is_refused(static:
         assert line.startswith("Error: static.npy")
         assert reason in line
         assert not out.exists()
+
+
+def test_a_row_without_numbers_leaves_the_longest_stretch(static: np.ndarray, tmp_path: Path) -> None:
+    broken = static.copy()
+    broken[77, 2] = np.nan
+    np.save(tmp_path / "static.npy", broken)
+    found = answer("allan", tmp_path / "static.npy", "--rate", RATE)
+    assert found["lines"] == [79, len(static)]
+    assert found["record"]["faults"] == ["1 rows without numbers, the first in line 78"]
+    np.save(tmp_path / "rest.npy", static[78:])
+    again = answer("allan", tmp_path / "rest.npy", "--rate", RATE)
+    assert found["axes"]["x"]["curve"] == again["axes"]["x"]["curve"]
+
+
+def test_a_logger_s_record_gives_the_noise_of_its_sensor_in_any_unit(static: np.ndarray, tmp_path: Path) -> None:
+    """Counts of 0.004 deg/s, polled at twice the sensor's rate, stamped in microseconds that wrap, ten seconds lost."""
+    counts = np.repeat(np.round(static / 0.004).astype(np.int64), 2, axis=0)
+    stamps = (4_000_000_000 + np.round(np.arange(len(counts)) / (2.0 * RATE) * 1e6).astype(np.int64)) % 2**32
+    rows = np.column_stack([stamps, counts])
+    rows = np.delete(rows, slice(2000, 2000 + round(20.0 * RATE)), axis=0)
+    np.savetxt(tmp_path / "log.csv", rows, "%d", ",", header="t_us,gx_raw,gy_raw,gz_raw", comments="")
+    found = answer("allan", tmp_path / "log.csv", "--gyro", "0.004 deg/s", "--unit", "deg/h")
+    assert found["rate_hz"] == pytest.approx(RATE, rel=1e-4)
+    for k, axis in enumerate("xyz"):
+        noise = (8.9e-3, 6.9e-3, 7.38e-3)[k] * 3600.0
+        assert found["axes"][axis]["random_walk"] == pytest.approx(noise, rel=0.03)
+    assert "gap of 10" in found["record"]["faults"][0]
+    assert "are counts" in refused("allan", tmp_path / "log.csv")
+    assert "expected one of the gyroscope" in refused(
+        "allan", tmp_path / "log.csv", "--gyro", "0.004 deg/s", "--unit", "g"
+    )
+    assert "expected readings of the accelerometer" in refused(
+        "allan", tmp_path / "log.csv", "--gyro", "0.004 deg/s", "--sensor", "accelerometer"
+    )
+
+
+def test_a_record_is_described_in_a_line_and_written_for_a_node(tmp_path: Path) -> None:
+    lines = [f"{20 * k},{0.5 if k % 3 else 0.7},0,0,0,0,{1.0 + 0.001 * (k % 5)}" for k in range(500)]
+    (tmp_path / "log.csv").write_text("\n".join(["t_ms,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g", *lines]))
+    done = run("calibrate", "record", tmp_path / "log.csv", "--out", tmp_path / "log.npy")
+    assert done.stdout == (
+        "log.csv: 500 rows; 10.0 s at 50 Hz by t_ms in ms; gyroscope gx_dps,gy_dps,gz_dps in deg/s; "
+        "accelerometer ax_g,ay_g,az_g in g; no gap, no fault\n"
+    )
+    rows = np.load(tmp_path / "log.npy")
+    assert rows[1] == pytest.approx([0.02, math.radians(0.5), 0.0, 0.0, 0.0, 0.0, 1.001 * 9.80665])
+    assert answer("calibrate", "record", tmp_path / "log.npy")["rate_hz"] == pytest.approx(50.0)
+    assert "expected another file that ends in .npy" in refused(
+        "calibrate", "record", tmp_path / "log.csv", "--out", tmp_path / "log.json"
+    )
+
+
+def test_a_certificate_has_number_serial_number_and_next_due_day(tmp_path: Path) -> None:
+    made = tmp_path / "gyro.pdf"
+    words = ("calibrate", "turntable", NODE_A1, "--reference", 720, "--certificate", made, "--date", "2024-05-31")
+    plain = run(*words)
+    assert plain.returncode == 0, plain.stderr
+    bare = made.read_bytes()
+    assert run(*words, "--serial", "A1-0042", "--number", "K-17", "--due", "2025-05-31").returncode == 0
+    assert made.read_bytes() != bare
+    late = refused(*words, "--due", "2024-05-31")
+    assert "--due: expected a day after that of the calibration, 2024-05-31, got 2024-05-31" in late
+
+
+def test_a_forced_calibration_says_so_in_its_file(tmp_path: Path) -> None:
+    from groundstation.calibration.block import read_calibration
+
+    record, out = tmp_path / "table.csv", tmp_path / "block.json"
+    rows = [row.split(",") for row in TABLE.splitlines() if row[:2] in ("x,", "y,", "z,")]
+    exchanged = [",".join([*row[:1], *row[3:5], *row[1:3], *row[5:]]) for row in rows]
+    record.write_text("\n".join(["axis,x_pos,x_neg,y_pos,y_neg,z_pos,z_neg", *exchanged]) + "\n")
+    words = ("calibrate", "turntable", record, "--reference", 720, "--out", out)
+    assert "refused by right-handed: the axes are left-handed" in refused(*words)
+    assert not out.exists()
+    found = answer(*words, "--force")
+    assert found["forced"][0].startswith("right-handed: ")
+    assert "; forced past right-handed: " in read_calibration(out).provenance.design
 
 
 def test_outputs_land_together_or_not_at_all(tmp_path: Path) -> None:
@@ -325,7 +400,9 @@ def test_a_calibration_that_was_changed_or_is_another_s_is_refused(tool: tuple, 
     assert "expected the calibration of an MWD triad" in refused("calibrate", "qc", CONTROL, "--accelerometers", path)
 
 
-@pytest.mark.parametrize("name", ["turntable", "attitudes", "mwd", "magnetometer", "qc"])
+@pytest.mark.parametrize(
+    "name", ["turntable", "attitudes", "mwd", "magnetometer", "qc", "record", "rests", "temperature"]
+)
 def test_every_calibration_has_help_with_an_example_on_a_line_of_its_own(name: str) -> None:
     assert f"\n    borechain calibrate {name}" in run("calibrate", name, "--help").stdout
 

@@ -9,6 +9,7 @@ import pytest
 from forked_commands import run, warm_forker
 
 ROOT = Path(__file__).parents[1]
+NORTH = "north-std-deg = 0.3\nnorth-check-deg = 0.2\nnorth-check-std-deg = 0.5"
 pytestmark = pytest.mark.slow
 
 
@@ -17,11 +18,11 @@ def check(*words: object) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
-def scenario(folder: Path, untold: str) -> Path:
+def scenario(folder: Path, untold: str, unchecked: str = "[]") -> Path:
     text = (ROOT / "scenarios" / "rig-3.toml").read_text()
     path = (ROOT / "scenarios" / "wellbore-1-path.csv").read_bytes()
     (folder / "wellbore-1-path.csv").write_bytes(path)
-    (folder / "rig.toml").write_text(f"{text}\n[setup]\nuntold = {untold}\n")
+    (folder / "rig.toml").write_text(f"{text}\n[setup]\nuntold = {untold}\nunchecked = {unchecked}\n")
     return folder / "rig.toml"
 
 
@@ -41,15 +42,34 @@ def test_what_a_crew_does_not_tell_is_named(tmp_path: Path) -> None:
     assert found["todo"].startswith("tell north")
 
 
+def test_what_a_crew_does_not_check_is_named_with_what_would(tmp_path: Path) -> None:
+    status, told, _ = check(scenario(tmp_path, "[]", '["north", "stick-up"]'), "--json")
+    found = json.loads(told)
+    assert (status, found["ready"], found["unchecked"]) == (1, False, ["north", "stick_up"])
+    assert found["todo"].startswith("check north: cmd/north?action=check")
+
+
 @pytest.mark.parametrize(
     ("lines", "status", "said"),
     [
-        ("north-std-deg = 0.3\ncollar-std-deg = 0.2", 0, "READY TO DRILL"),
+        (f"{NORTH}\ncollar-std-deg = 0.2", 0, "READY TO DRILL"),
+        ("north-std-deg = 0.3", 1, "check    north, not checked: a second bearing is"),
+        (
+            f"{NORTH}\nstick-up-m = 0.4\nstick-up-std-m = 0.01",
+            1,
+            "check    stick_up, not checked: the bit at the collar",
+        ),
+        (
+            f"north-deg = 3.0\n{NORTH}",
+            1,
+            "wrong    north is told as 3 ± 0.3 deg and checked as 0.2 ± 0.5 deg, 5 sigma apart",
+        ),
+        ("north-std-deg = 0.3\nnorth-check-deg = 1.0", 2, "expected north_check_deg and north_check_std_deg together"),
         ("tube-length-m = 2.0", 1, "missing  north"),
         ("north-std-deg = 0.0", 2, "'--north-std-deg': 0.0 is not in the range x>0.0"),
         ("north-deg = 3.0", 2, "Error: expected north_std_deg beside the value that it is of"),
         ("nort-deg = 3.0", 2, "nort-deg: unknown key"),
-        ('joint = [["4-3", 12.5, 0.05]]\nnorth-std-deg = 0.3', 0, "READY TO DRILL"),
+        (f'joint = [["4-3", 12.5, 0.05]]\n{NORTH}', 0, "READY TO DRILL"),
         ('joint = [["4", 12.5, 0.05]]\nnorth-std-deg = 0.3', 2, "joints.0.0: String should match pattern"),
     ],
 )

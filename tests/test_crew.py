@@ -309,7 +309,8 @@ def test_a_line_that_is_no_order_is_told(line: str, expected: str) -> None:
 
 async def test_north_is_missed_on_the_setup_panel_told_in_a_line_and_taken_back(tmp_path: Path) -> None:
     """The five-second task: which item costs most at the toe, and what is to be done next."""
-    rig = Rig(tmp_path, target=20.0, north_std_deg=None, mount_tilt_std_deg=None)
+    unknown = dict.fromkeys(("north_std_deg", "north_check_deg", "north_check_std_deg", "mount_tilt_std_deg"))
+    rig = Rig(tmp_path, target=20.0, **unknown)
     rig.run(5.0)
     for stop in range(1, 4):
         rig.drill(stop, 0.3)
@@ -329,10 +330,15 @@ async def test_north_is_missed_on_the_setup_panel_told_in_a_line_and_taken_back(
             worst = next(row for row in told["items"] if row["item"] == told["worst"])
             assert f"costs most at the toe: {worst['words']}, {worst['toe_cm']:.1f} cm" in lines
             await pilot.press("o", *"north action=tell angle_deg=12.5 sigma_deg=0.3", "enter")
+            text = await until(app, served, lambda text: "not checked: north" in text, speaks_of(3))
+            assert "next: check north: cmd/north?action=check;angle_deg=..;sigma_deg=.." in text
+            await pilot.press("o", *"north action=check angle_deg=12.4 sigma_deg=0.3", "enter")
             text = await until(app, served, lambda text: "\nREADY TO DRILL" in text, speaks_of(3))
             todo = rig.ask("setup")["todo"]
             assert "north" not in todo
             assert f"next: {todo}" in text
+            await pilot.press("o", *"setup action=undo", "enter")
+            await until(app, served, lambda text: "not checked: north" in text, speaks_of(3))
             await pilot.press("o", *"setup action=undo", "enter")
             await until(app, served, lambda text: "NOT READY TO DRILL, not told: north" in text, speaks_of(3))
             await pilot.press("o", *"what", "escape", "u")

@@ -78,6 +78,8 @@ def wall(folder: Path, heads: str, stations: str, more: str = "") -> Path:
             "expected at least two columns next to each other, got 1",
         ),
         ("column,north_m,east_m,down_m\nA,0,0,\nB,0,0.7,3\nC,0,1.4,\n", STRAIGHT, "", "B begins at 3 m: it opens at"),
+        ("column,north_m,east_m\n", STRAIGHT, "", "expected at least two columns next to each other, got none"),
+        (HEADS.replace("1.4", "0"), STRAIGHT, "", "columns A and C are one by their design; expected them apart"),
         (HEADS, STRAIGHT, "tight_to_m = 12", "column A ends at 10 m; expected a toe at 12 m"),
         (HEADS, STRAIGHT, "grid_scale_factor = 0", "grid_scale_factor: expected a positive number, got 0"),
         ("column,north_m,east_m,radius_m\nA,0,0,-1\nB,0,0.7,\n", STRAIGHT, "", "column A: radius_m: expected a number"),
@@ -99,6 +101,8 @@ def test_a_wall_that_cannot_be_is_refused_in_one_line(
         ("MD (m),Inc,Azi\n0,0,0\n30,1,0\n30,1,0\n", (), "line 4: expected a measured depth beyond 30 m, got 30 m"),
         (OK, (), "the reference hole runs in the offset hole all along; expected two holes"),
         (OK, ("--offset-radius-m", -1), "-1"),
+        (OK, ("--offset-head", 0, "nan", 0), "--offset-head: expected a finite number, got nan"),
+        (OK, ("--offset-head", 0, 30, 0, "--dip-deg", "inf"), "--dip-deg: expected a finite number, got inf"),
         (DEEP, (), "begins at 500 m, so nothing says where that is; expected the collar at 0 m first, or --from-m"),
     ],
 )

@@ -12,6 +12,7 @@ from borechain.crew.screen_panels import PLAN_HEIGHT, QUIET, fit_line
 
 View = dict[str, Any]
 HEAD_LINES = 4
+WRONG = ("not checked", "contradicted")
 HOUR_MIN = 90.0  # min, from which on an age is told in hours
 LEAST_CM = 0.05  # at the toe, below which nothing is lost by what was not told
 
@@ -22,7 +23,7 @@ def setup_panel(picture: Picture, now_utc: datetime.datetime) -> Text:
     if found is None:
         return Text("setup: not heard yet".ljust(80), QUIET)
     told = "READY TO DRILL: north and every joint are told"
-    ready = told if found["ready"] else f"NOT READY TO DRILL, not told: {', '.join(found['missing'])}"
+    ready = told if found["ready"] else f"NOT READY TO DRILL, {found['hold']}"
     lines = [fit_line(ready, "bold" if found["ready"] else "bold white on magenta")]
     lines += [fit_line(f"costs most at the toe: {found['costs_most']}", "bold")]
     lines += [fit_line(f"next: {found['todo']}", "bold")]
@@ -36,8 +37,10 @@ def setup_line(row: View, now_utc: datetime.datetime) -> Text:
     value = " to ".join(f"{number:.4g}" for number in row["value"]) or ("of its node" if row["told"] else "any")
     age = age_text(row["utc"], now_utc)
     line = f"{row['item']:15} {row['toe_cm']:6.1f} {value:>15} {row['sigma']:9.3g} {row['unit']:6} {age:>6}"
-    style = "bold red" if row["missing"] else "yellow" if not row["told"] and row["toe_cm"] >= LEAST_CM else QUIET
-    return fit_line(f"{line} {row['source']}", style)
+    style = "yellow" if not row["told"] and row["toe_cm"] >= LEAST_CM else QUIET
+    if row["missing"] or row["check"].startswith(WRONG):
+        style = "bold red"
+    return fit_line(f"{line} {row['source']}{' ' * bool(row['check'])}{row['check']}", style)
 
 
 def age_text(utc: str, now_utc: datetime.datetime) -> str:

@@ -71,7 +71,30 @@ def read_world(job: RigJob, say: Callable[[str], None] = say_on_stderr) -> World
         world = World(scenario.drilling(job.hole) if job.hole else scenario, job.seed)
     if world.scenario.medium.link == "off":
         raise ScenarioError(f'{job.scenario}: medium.link: expected "on" for a rig; only studies run without a link')
+    world.on_chips = tubes_on_chips(job.chips, world.scenario.tubes)
     return world
+
+
+def tubes_on_chips(said: str, tubes: int) -> frozenset[int]:
+    """Tubes of ``--chip``: numbers with commas, or all; what emulates them is looked for, and made.
+
+    Raises
+    ------
+    RigError
+        When it names no tube of the string.
+    ToolchainError
+        When compiler or emulator is missing.
+    """
+    if not said:
+        return frozenset()
+    whole = frozenset(range(1, tubes + 1))
+    chosen = whole if said == "all" else frozenset(int(word) for word in said.split(",") if word.strip().isdecimal())
+    if not chosen or not chosen <= whole or (said != "all" and len(said.split(",")) != len(chosen)):
+        raise RigError(f"--chip {said}: expected all, or numbers of tubes from 1 to {tubes} with commas")
+    from node.translation.chip_program import chip_program
+
+    chip_program()
+    return chosen
 
 
 def page_with_password(page: PageSettings, say: Callable[[str], None]) -> PageSettings:

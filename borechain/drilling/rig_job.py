@@ -39,6 +39,7 @@ class RigJob:
     served: PageSettings | None = None  # page of its ground station
     wall: Path | None = None  # wall file of which the hole is a column
     hole: str = ""  # of the scenario's site
+    chips: str = ""  # tubes whose node steps on an emulated chip: numbers with commas, or all
 
 
 def show_nothing(_progress: Tick | RigProgress) -> None:

@@ -82,7 +82,7 @@ def process_table(
     }
     for tube in range(1, world.scenario.tubes + 1):
         specs[str(tube)] = Spec(run_node, (place(f"tube-{tube}", tube), world.tube_settings(tube)))
-    return ProcessTable(specs, [PRELOAD[world.scenario.file.node.kernel]])
+    return ProcessTable(specs, [PRELOAD["fixed" if world.on_chips else world.scenario.file.node.kernel]])
 
 
 def operator_of(world: World, rig_name: str) -> Callable[[ZenohBus, str], Acted]:

@@ -37,7 +37,7 @@ QUESTIONS = 5  # after a survey
 START_S, LEARN_MS, ANSWER_MS = 2.0, 1.0, 20.0  # at most
 ASKED = (
     "status", "verdict", "string", "nodes/1", "stations", "stations/1", "stations/1/measurements", "trajectory",
-    "uncertainty", "column", "history", "events", "alarms", "measurements", "changes",
+    "uncertainty", "column", "history", "events", "alarms", "measurements", "changes", "adjustment", "setup",
 )  # fmt: skip
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import datetime
 import re
 import secrets
-import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +20,7 @@ from borechain.pki.private_files import write_private
 from telemetry.errors import KeyFileError
 from telemetry.media.credentials import DEPTH_SOURCE, file_name
 from telemetry.messages import BASE, ENCODER, MAX_TUBE
+from telemetry.toml_tables import parse_toml_tables
 from telemetry.transport.key_ring import (
     MOST_GENERATION,
     SUFFIX,
@@ -165,7 +165,7 @@ def read_secret(folder: Path) -> RigSecret:
     path = folder / SECRET_FILE
     text = read_private(path)
     try:
-        rows: dict[str, Any] = tomllib.loads(text)
+        rows: dict[str, Any] = parse_toml_tables(text)
         generations = tuple(_generation_of(row) for row in rows["generation"])
         secret = RigSecret(str(rows["rig"]), generations, frozenset(map(int, rows["revoked"])))
     except (KeyError, TypeError, ValueError, AttributeError):

@@ -96,7 +96,7 @@ def tables_of(draw: RigDraw) -> Tables:
 
 def drawn_errors(known: KnownSetUp, seed: int) -> dict[str, Any]:
     """What the crew of a seed tells wrongly, as far off as it states."""
-    draws = random_stream(seed, RandomStream.SET_UP).standard_normal(5 + TUBES)
+    draws = random_stream(seed, RandomStream.SET_UP).standard_normal(5 + TUBES + 2)
     north, collar_north, collar_east, scale, offset = draws[:5].tolist()
     return {
         "north_deg": known.north_deg * north,
@@ -105,7 +105,9 @@ def drawn_errors(known: KnownSetUp, seed: int) -> dict[str, Any]:
         "depth_scale": known.depth_scale * scale,
         "depth_offset_m": known.depth_offset_m * offset,
         "depth_std_m": known.depth_m,
-        "lengths_off_m": tuple((known.length_m * draws[5:]).tolist()),
+        "lengths_off_m": tuple((known.length_m * draws[5 : 5 + TUBES]).tolist()),
+        "north_check_deg": known.north_deg * float(draws[-2]),
+        "stick_up_check_m": known.depth_offset_m * float(draws[-1]),
     }
 
 

@@ -29,6 +29,8 @@ class JudgedHole:
     md : (s,) m, as it is told
     lean_error, lean_cov : (s, 2) and (s, 2, 2) rad, of the horizontal part of the unit vector
     error, cov : (s, 3) and (s, 3, 3) m, of the position: north, east, down
+    unfound : rad and m, by which the last station's direction and place may be off beside, as is told, while one tube
+        alone has read it
     """
 
     md: Array
@@ -36,6 +38,7 @@ class JudgedHole:
     lean_cov: Array
     error: Array
     cov: Array
+    unfound: tuple[float, float] = (0.0, 0.0)
 
     @property
     def direction_squares(self) -> Array:
@@ -46,6 +49,24 @@ class JudgedHole:
     def ellipsoid_squares(self) -> Array:
         """Likewise (s,) of the position's, of three."""
         return quadratic_forms(self.error, self.cov)
+
+    def worst_sigmas(self) -> tuple[float, float]:
+        """Worst direction, and worst position or direction, beyond what is told to be unfound, as of a normal number.
+
+        A direction has two degrees of freedom and a position three.
+        """
+        if not len(self.md):
+            return 0.0, 0.0
+        found = []
+        for squares, error, told, freedom in (
+            (self.direction_squares, self.lean_error, self.unfound[0], 2.0),
+            (self.ellipsoid_squares, self.error, self.unfound[1], 3.0),
+        ):
+            sigmas = np.sqrt(squares / freedom)
+            off = float(np.linalg.norm(error[-1]))
+            sigmas[-1] *= max(1.0 - told / off, 0.0) if off > 0.0 else 0.0
+            found.append(float(sigmas.max()))
+        return found[0], max(found)
 
     @property
     def axis_squares(self) -> Array:
@@ -68,7 +89,15 @@ def judge_hole_of(world: World, hole: SurveyedHole) -> JudgedHole:
         np.reshape([one.total_cov for one in directions], (-1, 2, 2)),
         hole.trajectory.positions[places] - true_positions,
         hole.trajectory.covs[places],
+        unfound_of(hole),
     )
+
+
+def unfound_of(hole: SurveyedHole) -> tuple[float, float]:
+    """What is told of the last station, rad and m, beside its sigma."""
+    examined = hole.examined if hole.is_adjusted else None
+    alone = None if examined is None else examined.last_look
+    return (0.0, 0.0) if alone is None else (alone.direction, alone.toe)
 
 
 def true_depth(world: World, station: SurveyStation) -> float:

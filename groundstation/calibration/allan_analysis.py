@@ -1,4 +1,4 @@
-"""Allan deviation of a static record, what it says of the sensor, and what the filter takes from it.
+"""Allan deviation of a static record, and what it says of the sensor.
 
 The overlapping estimator is written here, in four lines: `allantools` 2024.6 gives the same numbers to the last bit,
 but installs Sphinx and twenty packages more. Tests hold it against eq. V.28 and the published NBS 1000-point data.
@@ -30,8 +30,6 @@ STUCK_AT_EXTREME = 0.01  # of the readings; of Gaussian noise hardly one stands 
 JUMP = 8.0  # robust standard deviations between neighbouring means: chance gives 4.5 in a day
 BLOCKS = 64  # of a record, in which slow steps and trends are looked for
 DRIFT = 20.0  # fitted drift over the record, in standard deviations beside it; of 1000 pure random walks one has it
-GAUSS_MARKOV_PEAK = 1.89  # averaging time of the largest Allan deviation, in correlation times
-FLOOR_TAU = 30.0  # s, where the published curve of the node's sensor has its floor
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,15 +61,6 @@ class AllanResult:
     def floor(self) -> Estimate:
         """F, bias instability as the flat part of the curve, unit."""
         return self.fit.floor
-
-
-@dataclass(frozen=True, slots=True)
-class FilterNoise:
-    """White noise (unit / sqrt(Hz)) and first-order Gauss-Markov bias (unit, s) of one axis, for the filter."""
-
-    white: float
-    bias_std: float
-    bias_tau: float
 
 
 def allan_variance(record: Array, factor: int) -> float:
@@ -114,46 +103,6 @@ def analyse_allan_deviation(record: Array, rate: float) -> list[AllanResult]:
     """
     columns = _columns(np.asarray(record, dtype=np.float64), rate)
     return [_analyse_axis(columns[:, k], rate, AXES[k]) for k in range(columns.shape[1])]
-
-
-def gauss_markov_variance(tau: Array | float, correlation: float) -> Array:
-    """Allan variance at ``tau`` (s) of a Gauss-Markov process of variance 1. Source: IEEE Std 952.
-
-    2 / x (1 - (3 - 4 exp(-x) + exp(-2 x)) / (2 x)),  x = tau / correlation.
-    """
-    x = np.asarray(tau, dtype=np.float64) / correlation
-    return np.asarray(2.0 / x * (1.0 - (3.0 - 4.0 * np.exp(-x) + np.exp(-2.0 * x)) / (2.0 * x)))
-
-
-def filter_noise(at_1s: float, at_floor: float, floor_tau: float = FLOOR_TAU) -> FilterNoise:
-    """White noise and Gauss-Markov bias whose Allan deviation passes through two points of a curve.
-
-    The bias has its largest Allan deviation at the floor: correlation time = floor_tau / 1.89; then
-    sigma^2(tau) = N^2 / tau + sigma_b^2 g(tau) at 1 s and at ``floor_tau`` (s) are two linear equations.
-
-    Raises
-    ------
-    CalibrationError
-        When no such pair exists: the floor lies above what the point at 1 s allows, or below the white noise.
-    """
-    if not floor_tau > 1.0:
-        raise CalibrationError(f"filter noise: expected the floor at more than 1 s, got {floor_tau} s")
-    correlation = floor_tau / GAUSS_MARKOV_PEAK
-    taus = np.array([1.0, floor_tau])
-    system = np.stack([1.0 / taus, gauss_markov_variance(taus, correlation)], axis=1)
-    white, bias = np.linalg.solve(system, np.array([at_1s, at_floor]) ** 2)
-    if not (math.isfinite(white + bias) and white >= 0.0 and bias >= 0.0):
-        raise CalibrationError(
-            f"filter noise: no white and Gauss-Markov noise has an Allan deviation of {at_1s} at 1 s and {at_floor} "
-            f"at {floor_tau} s"
-        )
-    return FilterNoise(math.sqrt(white), math.sqrt(bias), correlation)
-
-
-def filter_noise_of(result: AllanFit, floor_tau: float = FLOOR_TAU) -> FilterNoise:
-    """The filter's noise from the fitted curve, without the rate random walk, which its bias state cannot hold."""
-    white, floor = result.random_walk.value**2, result.floor.value**2
-    return filter_noise(math.sqrt(white + floor), math.sqrt(white / floor_tau + floor), floor_tau)
 
 
 def _sums(record: Array) -> Array:

@@ -136,6 +136,7 @@ def replay_summary(recording: Recording, folder: Path) -> dict[str, Any]:
         return {
             "rig": recording.rig,
             "whole": recording.whole,
+            "damage": [one.line for one in recording.damage],
             "events": done.events,
             "missing": done.missing,
             "stations": ask("stations")["stations"],

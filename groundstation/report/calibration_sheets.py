@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.calibration.allan_analysis import AXES, AllanReading, AllanResult, FilterNoise
+from groundstation.calibration.allan_analysis import AXES, AllanReading, AllanResult
 from groundstation.calibration.allan_fit import Estimate
 from groundstation.calibration.attitudes import AttitudeFit
+from groundstation.calibration.bias_model import LEARNT, SPANS, FilterNoise
 from groundstation.calibration.coverage import COVERAGE
 from groundstation.calibration.mwd_model import ACCELEROMETER_AXES
 from groundstation.calibration.mwd_solve import MwdErrors, MwdFit
@@ -146,18 +148,25 @@ def quality_sheet(report: QualityReport, facts: Facts) -> Sheet:
     )
 
 
-def allan_sheet(results: Sequence[AllanResult], noises: Sequence[FilterNoise | None], unit: str, facts: Facts) -> Sheet:
-    """Terms of the fit with their 95 % intervals, the raw readings beside them, and what the filter takes."""
-    terms, raw, taken, warnings = [], [], [], []
-    for name, result, noise in zip(AXES, results, noises, strict=False):
+def allan_sheet(
+    results: Sequence[AllanResult],
+    noises: Sequence[FilterNoise],
+    drifts: Sequence[list[dict[str, Any]]],
+    unit: str,
+    facts: Facts,
+) -> Sheet:
+    """Terms of the fit with their 95 % intervals, the raw readings beside them, what the filter takes and predicts."""
+    terms, raw, taken, drifted, warnings = [], [], [], [], []
+    for name, result, noise, drift in zip(AXES, results, noises, drifts, strict=False):
         walk = result.fit.rate_walk
         terms.append(
             (name, *_interval(result.random_walk), *_interval(result.floor), number_text(walk.value, 3) if walk else "")
         )
         low = result.raw_minimum
         raw.append((name, *_reading(result.raw_at_1s), number_text(low.tau, 4), *_reading(low)))
-        if noise is not None:
-            taken.append((name, *(number_text(v, 4) for v in (noise.white, noise.bias_std, noise.bias_tau))))
+        bound = "at most, none is seen" if noise.is_bound else ""
+        taken.append((name, *(number_text(v, 4) for v in (noise.white, noise.bias_std, noise.bias_tau)), bound))
+        drifted.append((name, *(_drift(one[of]) for one in drift for of in ("predicted", "seen"))))
         if not result.fit.consistent:
             warnings.append(
                 f"axis {name}: the curve is not of the fitted shape, chi^2 {result.fit.chi2:.0f} of "
@@ -174,10 +183,19 @@ def allan_sheet(results: Sequence[AllanResult], noises: Sequence[FilterNoise | N
             raw,
         ),
         SheetTable(
-            f"For the filter: white, {rooted}, bias, {unit}", ("axis", "white", "bias", "correlation, s"), taken
+            f"For the filter: white, {rooted}, bias, {unit}", ("axis", "white", "bias", "correlation, s", ""), taken
+        ),
+        SheetTable(
+            f"Drift after {LEARNT:g} s at rest, {unit.removesuffix('/s')}{'' if unit.endswith('/s') else ' s'}",
+            ("axis", *(text for span in SPANS for text in (f"in {span:g} s", "seen"))),
+            drifted,
         ),
     )
     return Sheet("Allan deviation", facts, tables, warnings)
+
+
+def _drift(size: float | None) -> str:
+    return "" if size is None else number_text(size, 3)
 
 
 def _errors(found: MwdErrors) -> tuple[str, ...]:

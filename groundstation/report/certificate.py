@@ -24,7 +24,10 @@ class CertificateError(GroundError, RuntimeError):
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Subject and sources of a calibration: words, day, record with its hash, hash of the block, software."""
+    """Subject and sources of a calibration: words, day, record with its hash, hash of the block, software.
+
+    ``papers`` are names and texts of the laboratory's books: number of the certificate, serial number, next due day.
+    """
 
     subject: str
     day: date
@@ -32,6 +35,7 @@ class Identity:
     record_sha256: str
     block_sha256: str | None
     software: str
+    papers: tuple[tuple[str, str], ...] = ()
 
 
 def template_data(sheet: Sheet, panels: Sequence[Panel], identity: Identity) -> str:
@@ -45,6 +49,7 @@ def template_data(sheet: Sheet, panels: Sequence[Panel], identity: Identity) -> 
             "record_sha256": identity.record_sha256,
             "block_sha256": identity.block_sha256,
             "software": identity.software,
+            "papers": [list(paper) for paper in identity.papers],
             "facts": [list(fact) for fact in sheet.facts],
             "warnings": list(sheet.warnings),
             "tables": [

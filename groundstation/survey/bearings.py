@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-UPWARD = 1e-12  # of 1 + cos I, of a direction that is straight up
+TINY = 1e-300  # of a squared lean, of a direction that is straight up
 
 
 def wrap_angle(angle: Any) -> Any:
@@ -29,8 +29,9 @@ def planes_across(tangents: Array) -> Array:
     They are high side and right turned back by the azimuth, so that they stay as they are where a plan passes the
     vertical. Straight up they are north and east again, and turn with the azimuth all about it.
     """
-    x, y = tangents[..., 0], tangents[..., 1]
-    apart = np.maximum(1.0 + tangents[..., 2], UPWARD)
+    x, y, z = tangents[..., 0], tangents[..., 1], tangents[..., 2]
+    # 1 + z; beside straight up it is the small difference of numbers that are not, and the lean tells it whole
+    apart = np.where(z < -0.5, np.maximum(x * x + y * y, TINY) / (1.0 - np.minimum(z, 0.0)), 1.0 + z)
     found = np.empty((*tangents.shape[:-1], 2, 3))
     found[..., 0, 0], found[..., 1, 1] = 1.0 - x * x / apart, 1.0 - y * y / apart
     found[..., 0, 1] = found[..., 1, 0] = -x * y / apart

@@ -23,6 +23,7 @@ class Loop(NamedTuple):
     aiding: Callable[..., int]
 
 
+CHIP: Final = "chip"  # kernel of a tube that steps on an emulated chip: none of a whole string
 MakeLoop: TypeAlias = "Callable[[Array | None], Loop]"
 
 
@@ -43,7 +44,16 @@ def fixed_loop(integers: Array | None = None) -> Loop:
     return Loop(fixed.run_cycle, fixed.offer_aiding, fixed.step, fixed.aiding)
 
 
-LOOPS: Final[dict[str, MakeLoop]] = {"float64": float64_loop, "fixed": fixed_loop}  # each is loaded only when used
+def chip_loop(integers: Array | None = None) -> Loop:
+    """The filter in integers on an emulated chip; see ``node.firmware.chip_node.ChipNode``."""
+    from node.firmware.chip_node import ChipNode
+
+    chip = ChipNode(integers)
+    return Loop(chip.run_cycle, chip.offer_aiding, chip.step, chip.aiding)
+
+
+# each is loaded only when used
+LOOPS: Final[dict[str, MakeLoop]] = {"float64": float64_loop, "fixed": fixed_loop, CHIP: chip_loop}
 
 
 def kernel_of(kernel: str, integers: Array | None = None) -> Loop:

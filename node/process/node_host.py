@@ -12,11 +12,13 @@ from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.compiler import leave_blas_out
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.step.precompile import warm_encoder, warm_step
+from node.process.drivers.replay_drivers import ReplayImu
 from node.process.drivers.source import EncoderSource, ImuSource
+from node.process.drivers.timed import TimedImu
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess
 from telemetry.messages import ENCODER, Side
-from telemetry.runtime.hosting import OwnTime, Place, run_by_own_clock, run_stepped, warn_of_keys
+from telemetry.runtime.hosting import OwnTime, Place, run_by_own_clock, run_stepped, warn_of_keys, write_warning
 from telemetry.runtime.timing import CycleTiming
 from telemetry.transport.authentication import read_key
 
@@ -43,6 +45,9 @@ def run_node(
 
     def build(timing: CycleTiming | None = None) -> TubeProcess:
         process = TubeProcess(settings, place.folder, key=key, imus=imus, timing=timing, seals=seals)
+        for imu in imus:
+            if isinstance(imu, ReplayImu | TimedImu) and imu.understood:
+                write_warning(name, imu.understood)
         loop = kernel_of(settings.kernel)
         warm_step(loop.step, loop.aiding)  # half a minute on a cold machine: before the token of life
         return process

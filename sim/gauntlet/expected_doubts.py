@@ -30,7 +30,7 @@ EXPECTED: Final[dict[str, ExpectedDoubt]] = {
     "hole-moves": ExpectedDoubt("direction", "all tubes see it; earlier surveys of the place are dropped"),
     "depth-scale": ExpectedDoubt("depth", "the depth is told with its sigma; a scale beyond that is not seen"),
     "depth-stuck": ExpectedDoubt("depth", "a string that turns without getting deeper is not seen"),
-    "north-wrong": ExpectedDoubt("north", "all azimuths turn with what is told, which is kept and can be undone"),
+    "north-wrong": ExpectedDoubt("north", "don't know until a second bearing checks it; kept, and undone by one order"),
     "collar-wrong": ExpectedDoubt("collar", "the first station contradicts it, and the crew is told so"),
     "length-wrong": ExpectedDoubt("depth", "surveys of the tubes above move; no other reading speaks against it"),
     "joint-misread": ExpectedDoubt("direction", "the tube restarts and finds its yaw against what it had saved"),

@@ -11,7 +11,7 @@ from sim.errors import RigError
 if TYPE_CHECKING:
     from telemetry.media.zenoh_bus import ZenohBus
 
-ASKED = ("stations", "measurements", "column", "alarms", "recalibration", "wall")
+ASKED = ("stations", "measurements", "column", "alarms", "recalibration", "wall", "trajectory")
 
 
 def ask_surveys(bus: ZenohBus, rig_name: str) -> dict[str, Any]:

@@ -54,7 +54,25 @@ def told_settings(world: World) -> dict[str, Any]:
         "stick-up": {"stick_up_std_m": told.stick_up_std_m},
         "mounts": {"mount_tilt_std_deg": max(world.scenario.file.joints.mount_tilt_std_deg, EXACTLY_DEG)},
     }
-    return {key: value for name, told_ in by_name.items() if name not in told.untold for key, value in told_.items()}
+    by_name = {name: settings for name, settings in by_name.items() if name not in told.untold}
+    checks = {name: settings for name, settings in checked_settings(world).items() if name in by_name}
+    return {key: value for settings in (*by_name.values(), *checks.values()) for key, value in settings.items()}
+
+
+def checked_settings(world: World) -> dict[str, dict[str, Any]]:
+    """Second readings of what no survey shows, by name: as good as the first, and of what is so."""
+    told, wrong = world.scenario.file.setup, world.scenario.file.told
+    by_name = {
+        "north": {
+            "north_check_deg": wrong.north_deg + wrong.north_check_deg,
+            "north_check_std_deg": told.north_std_deg,
+        },
+        "stick-up": {
+            "stick_up_check_m": wrong.depth_offset_m + wrong.stick_up_check_m,
+            "stick_up_check_std_m": told.stick_up_std_m,
+        },
+    }
+    return {name: settings for name, settings in by_name.items() if name not in told.unchecked}
 
 
 def told_collar(world: World) -> tuple[float, float]:

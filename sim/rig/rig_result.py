@@ -29,6 +29,8 @@ def rig_result(answers: dict[str, Any], world: World) -> dict[str, Any]:
     }
     if "wall" in answers:
         result["wall"] = answers["wall"]["wall"]
+        if result["wall"] is not None:  # into whose file the hole goes
+            result["trajectory"] = answers["trajectory"]["points"]
     if world.rack is not None:
         result["calibration"] = calibration_result(answers["recalibration"], measurements, world)
     return result

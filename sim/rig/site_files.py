@@ -9,7 +9,9 @@ from typing import Any
 from sim.world.scenario import Scenario
 
 WALL_FILE, HEADS_FILE, STATIONS_FILE = "wall.toml", "heads.csv", "stations.csv"
-Row = tuple[str, float, float, float]  # hole, measured depth (m), inclination and azimuth (deg)
+COVARIANCE = {"cov_nn_m2": (0, 0), "cov_ne_m2": (0, 1), "cov_nd_m2": (0, 2), "cov_ee_m2": (1, 1), "cov_ed_m2": (1, 2),
+              "cov_dd_m2": (2, 2)}  # fmt: skip
+Row = tuple[str | float, ...]  # hole, measured depth (m), inclination and azimuth (deg), and the covariance
 
 
 def write_wall(folder: Path, scenario: Scenario) -> Path:
@@ -34,11 +36,16 @@ def write_stations(folder: Path, rows: list[Row]) -> None:
     """Write the surveys of the holes that are finished."""
     with (folder / STATIONS_FILE).open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(["column", "md_m", "inclination_deg", "azimuth_deg"])
+        writer.writerow(["column", "md_m", "inclination_deg", "azimuth_deg", *COVARIANCE])
         writer.writerows(rows)
 
 
 def hole_rows(hole: str, result: dict[str, Any]) -> list[Row]:
-    """Surveys of a finished hole from its vertical head down."""
-    below = [(hole, s["md_m"], s["inclination_deg"], s["azimuth_deg"]) for s in result["stations"] if s["md_m"] > 0.0]
-    return [(hole, 0.0, 0.0, 0.0), *below]
+    """Surveys of a finished hole from its collar down, as its ground station draws it and knows it."""
+    return [
+        (
+            hole, point["md_m"], point["inclination_deg"], point["azimuth_deg"],
+            *(point["covariance_m2"][a][b] for a, b in COVARIANCE.values()),
+        )
+        for point in result["trajectory"]
+    ]  # fmt: skip

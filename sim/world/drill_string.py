@@ -167,6 +167,7 @@ class DrillString:
             blocks=s.blocks,
             advance=file.rotation.advance_m,
             depth_at_start=file.rig.depth_at_start_m,
+            longer=file.told.lengths_off_m if file.rotation.advance_m is None else (),
         )
 
     def _string_torsion(self) -> StringTorsion | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -96,6 +97,8 @@ class Motion:
     blocks : number of them; as many as it takes to add every tube if absent
     advance : m of the bit in one block; a tube's length if absent
     depth_at_start : m of the bit; that of all tubes at the start if absent
+    longer : m, by which tubes from the bit up are longer than others, none of the rest: each is added at the height of
+        those before, so the bit goes so much further with it
     """
 
     def __init__(
@@ -114,6 +117,7 @@ class Motion:
         blocks: int | None = None,
         advance: float | None = None,
         depth_at_start: float | None = None,
+        longer: Sequence[float] = (),
     ) -> None:
         self.begin = begin
         self._turn = turn
@@ -124,6 +128,9 @@ class Motion:
         first = max(at_start, 1)
         count = tubes - first + 1 if blocks is None else blocks
         self.lengths = np.minimum(first + np.arange(count), tubes)  # tubes in the string in each block
+        off = np.zeros(tubes)
+        off[: len(longer)] = longer
+        self._further = np.where(np.diff(self.lengths, prepend=at_start) > 0, off[self.lengths - 1], 0.0)
         phases: list[SchedulePhase] = []
         at, before = begin, at_start
         for tube in self.lengths.tolist():
@@ -154,7 +161,15 @@ class Motion:
         """Measured depth of the bit (m) and its two derivatives at rig times ``t`` (n,)."""
         angle, rate, acceleration = self.drive(t)
         pitch = self._advance / self._turn.angle
-        return self._depth_at_start + (angle - self._first_angle) * pitch, rate * pitch, acceleration * pitch
+        depth = self._depth_at_start + (angle - self._first_angle) * pitch
+        if not self._further.any():
+            return depth, rate * pitch, acceleration * pitch
+        block, part = np.divmod(np.maximum(angle - self._first_angle, 0.0) / self._turn.angle, 1.0)
+        k = np.minimum(block.astype(np.intp), len(self._further) - 1)
+        whole = np.concatenate([[0.0], np.cumsum(self._further)])
+        depth += np.where(block < len(self._further), whole[k] + part * self._further[k], whole[-1])
+        pitch_there = pitch + self._further[k] / self._turn.angle
+        return depth, rate * pitch_there, acceleration * pitch_there
 
     def time_of_angle(self, angle: float) -> float:
         """Rig time at which the drive head reached ``angle``; the start for what it never had to reach."""

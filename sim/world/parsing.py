@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from sim.errors import ScenarioError
+from telemetry.toml_tables import parse_toml_tables
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -25,8 +26,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         When the file cannot be read or is not TOML.
     """
     try:
-        with path.open("rb") as file:
-            return tomllib.load(file)
+        return parse_toml_tables(path.read_text("utf-8"))
     except OSError as error:
         raise ScenarioError(
             f"{path}: {error.strerror}; expected a scenario file, or a name of borechain scenario list"

@@ -20,12 +20,14 @@ class ToldSection(ScenarioSection):
     joint_deg: Angle = Field(0.0, description="by which the joint to the tube below it is told wrong")
     drive_deg: Angle = Field(0.0, description="by which its joint to the drive head is told wrong")
     north_deg: Angle = Field(0.0, description="of the encoder's zero, by which it lies east of the north that is told")
+    north_check_deg: Angle = Field(0.0, description="by which a second bearing, which checks the north, is off")
     collar_north_deg: float = Field(0.0, ge=-10.0, le=10.0, description="lean of the collar as told, less the true one")
     collar_east_deg: float = Field(0.0, ge=-10.0, le=10.0, description="likewise")
     lengths_off_m: tuple[Annotated[float, Field(ge=-1.0, le=1.0)], ...] = Field(
         (), description="by which tubes are longer than all are told to be, from tube 1 up; none of the others"
     )
     depth_offset_m: float = Field(0.0, ge=-10.0, le=10.0, description="of the measured depth, as of a stick-up")
+    stick_up_check_m: float = Field(0.0, ge=-10.0, le=10.0, description="by which a second reading of it is off")
     depth_scale: float = Field(0.0, ge=-0.2, le=0.2, description="of the measured depth, by which it counts too much")
     depth_std_m: NotNegative = Field(0.0, le=1.0, description="of it, another error at every stop; 1 sigma")
     depth_stuck_after_s: NotNegative | None = Field(

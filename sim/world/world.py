@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from node.firmware.imu_settings import ImuSettings
+from node.firmware.kernel_choice import CHIP
 from node.firmware.torque import TorqueSettings
 from node.firmware.tube_settings import TubeSettings
 from node.kernels.record.filter_record import Scheme
@@ -43,6 +44,7 @@ class World(DrillString):
     def __init__(self, scenario: Scenario, seed: int) -> None:
         super().__init__(scenario, seed)
         self.sensors = Sensors(self)
+        self.on_chips: frozenset[int] = frozenset()  # tubes whose node steps on an emulated chip
         self.faults: tuple[KillNode, ...] = scenario.faults
         self._check_faults()
         self.radio = self._radio_links()
@@ -106,7 +108,7 @@ class World(DrillString):
             lower_joint=joints.lower_joint,
             mount_std=math.radians(self.scenario.file.joints.mount_std_deg),
             scheme=Scheme[self.scenario.file.node.scheme.upper()],
-            kernel=self.scenario.file.node.kernel,
+            kernel=CHIP if tube in self.on_chips else self.scenario.file.node.kernel,
             stiffness=self._stiffness,
             torsion="variance" if self.scenario.file.node.torsion == "variance" else "gate",
             joints=self.scenario.file.node.joints,

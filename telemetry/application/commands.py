@@ -256,6 +256,13 @@ COMMANDS: tuple[CommandSpec, ...] = (
         action="tell",
     ),
     CommandSpec(
+        "north",
+        ObeyedBy.GROUND,
+        "checks what was told of north by a second bearing, taken by itself; it does not take the place of the first",
+        (_angle("angle", "of the encoder's zero, from site north, clockwise", math.tau), SIGMA),
+        action="check",
+    ),
+    CommandSpec(
         "collar",
         ObeyedBy.GROUND,
         "tells the direction of the hole at the collar; what the first station says against it is told back",
@@ -305,9 +312,16 @@ COMMANDS: tuple[CommandSpec, ...] = (
         action="tell",
     ),
     CommandSpec(
+        "stick_up",
+        ObeyedBy.GROUND,
+        "checks what was told of the stick-up by a second reading, as with the bit at the collar's edge",
+        (_argument("height", NUMBER, "over the collar", unit="m", low=-20.0, high=20.0, needed=True), SIGMA_M),
+        action="check",
+    ),
+    CommandSpec(
         "setup",
         ObeyedBy.GROUND,
-        "takes the newest of north, collar, joint, length and stick-up back that still stands",
+        "takes the newest of north, collar, joint, length, stick-up and their checks back that still stands",
         action="undo",
     ),
 )

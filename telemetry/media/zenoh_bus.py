@@ -179,12 +179,22 @@ class ZenohBus:
             raise MediumError(f"selector {selector}: {error}") from error
         return [_reply(reply) for reply in replies]
 
-    def liveliness_token(self, key: str) -> None:
-        """Declare a liveliness token on ``key`` until the session or the process ends."""
-        self._declared.append(self._session.liveliness().declare_token(key))
+    def liveliness_token(self, key: str) -> Callable[[], None]:
+        """Declare a liveliness token on ``key`` until the session or the process ends; returns what takes it back."""
+        declared = self._session.liveliness().declare_token(key)
+        self._declared.append(declared)
+
+        def take_back() -> None:
+            self._declared.remove(declared)
+            end_declaration(declared)
+
+        return take_back
 
     def tokens(self, pattern: str, timeout: float) -> list[str]:
-        """Keys of the liveliness tokens that are there now, asked for ``timeout`` wall seconds at most."""
+        """Keys of the liveliness tokens that are there now, asked for ``timeout`` wall seconds at most.
+
+        One of this session comes twice where a router knows it: the session answers for itself.
+        """
         replies = self._session.liveliness().get(pattern, timeout=timeout)
         return sorted(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
 

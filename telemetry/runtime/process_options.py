@@ -16,6 +16,7 @@ from telemetry.media.credentials import needs_tls
 from telemetry.media.media_table import check_medium
 from telemetry.messages import BASE, ENCODER, MAX_TUBE, Side, address_name
 from telemetry.runtime.command_line import InputFault
+from telemetry.toml_tables import parse_toml_tables
 
 if TYPE_CHECKING:
     from telemetry.runtime.hosting import OwnTime, Place
@@ -28,7 +29,7 @@ def read_config(context: click.Context, _parameter: click.Parameter, path: Path 
     if path is None:
         return
     try:
-        values = tomllib.loads(path.read_text())
+        values = parse_toml_tables(path.read_text())
     except OSError as error:
         raise click.BadParameter(f"{path}: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -23,7 +23,6 @@ import datetime
 import hmac
 import os
 import stat
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,6 +31,7 @@ from typing import Any
 from telemetry.errors import KeyFileError
 from telemetry.media.credentials import DEPTH_SOURCE, file_name
 from telemetry.messages import BASE, ENCODER
+from telemetry.toml_tables import parse_toml_tables
 from telemetry.transport.seal import SEAL_KEY_SIZE, SealKey
 
 FORMAT = 1
@@ -169,7 +169,7 @@ def read_ring(path: Path, address: int, now: datetime.datetime | None = None) ->
     """
     text = read_private(path)
     try:
-        rows: dict[str, Any] = tomllib.loads(text)
+        rows: dict[str, Any] = parse_toml_tables(text)
         ring = _ring_of(rows)
     except (KeyError, TypeError, ValueError, AttributeError):
         raise KeyFileError(f"key file {path}: expected keys as borechain pki writes them, got something else") from None

@@ -55,7 +55,7 @@ def toe_departure(found: Examination, drawn: DrawnString) -> float:
     """Square of the toe's error by its covariance, of two degrees of freedom."""
     adjusted = found.adjusted
     errors = np.einsum("kai,ki->ka", adjusted.linear.bases, drawn.tangents - adjusted.now.tangents)[1:]
-    shared = adjusted.columns[1:, :2].sum(axis=0)
+    shared = np.column_stack([adjusted.columns[1:, :2].sum(axis=0), found.suspected[1:].sum(axis=0)])
     off, cov = errors.sum(axis=0), shared @ shared.T + adjusted.own_covs[1:, :2, :2].sum(axis=0)
     return float(off @ np.linalg.solve(cov, off))
 

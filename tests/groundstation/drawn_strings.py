@@ -63,14 +63,19 @@ def draw_string(
     tilt_deg: float = 0.05,
     play_deg: float = 0.01,
     same_faces: bool = False,
+    begins_deg: float = 0.0,
 ) -> DrawnString:
     """Draw a string that drills ``count`` stations of 2 m, building 0.34 deg in each, and looks at each as it passes.
 
+    It begins with an inclination of ``begins_deg``, 0 to 180 deg.
     All that the priors name is drawn from them; ``kind`` and ``size`` say what is wrong beside, see ``SIZES``.
     """
     rng = np.random.default_rng([seed, ["none", *SIZES].index(kind)])
     md = np.arange(count + 1) * LEG
-    lean, azimuth = 0.34 * DEG * np.arange(count + 1), rng.uniform(0.0, 360.0) * DEG + rng.normal(0.0, 0.005)
+    lean, azimuth = (
+        (begins_deg + 0.34 * np.arange(count + 1)) * DEG,
+        rng.uniform(0.0, 360.0) * DEG + rng.normal(0.0, 0.005),
+    )
     tangents = np.stack([np.sin(lean) * np.cos(azimuth), np.sin(lean) * np.sin(azimuth), np.cos(lean)], axis=1)
     biases, tilts = rng.normal(0.0, bias_mg * MG, (count, 3)), rng.normal(0.0, tilt_deg * DEG, (count, 2))
     joints, mounts = rng.normal(0.0, 0.1 * DEG, count), rng.normal(0.0, 0.02 * DEG, count)
@@ -139,7 +144,8 @@ def draw_string(
         2e-3,
         play_deg * DEG,
     )
-    path = PathPrior(md, np.array([0.0, 0.0, 1.0]), np.diag([1.0, 1.0, 0.0]) * (0.5 * DEG) ** 2, 0.15 * DEG, 20.0)
+    across = np.eye(3) - np.outer(tangents[0], tangents[0])
+    path = PathPrior(md, tangents[0].copy(), across * (0.5 * DEG) ** 2, 0.15 * DEG, 20.0)
     run = RunOfStops(md[1:], np.arange(count) * HOUR, md, causes)
     return DrawnString(looks, string, path, run, tangents, tube, other, onset)
 

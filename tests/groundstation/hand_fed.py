@@ -15,7 +15,10 @@ from telemetry.presentation.msgpack_codec import encode_message
 
 VAR = (0.0034**2) / 32
 CALIBRATED = {"accelerometer_bias_std_deg": 0.002}
-TOLD = {"north_std_deg": 1e-12, "collar_std_deg": 1e-12, "collar_inclination_deg": 0.0, "mount_tilt_std_deg": 0.01}
+TOLD = {
+    "north_std_deg": 1e-12, "north_check_deg": 0.0, "north_check_std_deg": 1e-12, "collar_std_deg": 1e-12,
+    "collar_inclination_deg": 0.0, "mount_tilt_std_deg": 0.01,
+}  # fmt: skip
 # nothing is known of path and sensors that would pull a direction off what its one look says
 FOLLOWED = {
     "curvature_std_deg_per_m": 1e4, "accelerometer_bias_std_deg": 1e-6, "mount_tilt_std_deg": 1e-6,

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 from hand_fed import Rig
 
-from groundstation.gateway.lease import take_lease
+from groundstation.gateway.lease import RigLease
 from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.ground_host import answering_operators, page_of
-from telemetry.media.zenoh_bus import open_router
+from telemetry.media.zenoh_bus import open_client, open_router
 from telemetry.messages import Event, Severity
 
 
@@ -56,7 +56,7 @@ def serving(rig: Rig, page: PageSettings | None = None) -> Iterator[Served]:
 
     async def serve() -> None:
         with open_router(endpoint) as bus, page_of(page) as serve_page:
-            take_lease(bus, "rig-1")
+            RigLease(bus, "rig-1", lambda: open_client(endpoint, 2.0))
             async with answering_operators(rig.ground, bus, serve_page):
                 ready.set()
                 await end.wait()

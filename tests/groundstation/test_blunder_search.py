@@ -76,7 +76,7 @@ def test_until_it_ends_it_is_said_that_something_does_not_fit(apart: RigModel) -
     examined = apart.hole.examined
     assert examined is not None
     assert blamed(apart) == {}
-    assert (examined.surveys, told(apart)) == (0, [UNEXPLAINED])
+    assert (examined.surveys, told(apart)) == (len(moved_hole()) - STOPS, [UNEXPLAINED])  # of the stops before
     before = apart.hole.version
     searched_through(apart)
     assert UNEXPLAINED not in told(apart)
@@ -117,4 +117,17 @@ def test_a_station_that_comes_between_others_drops_what_was_found(apart: RigMode
     assert examined is not None
     assert examined.surveys in (0, len(placed))
     searched_through(apart)
+    assert list(blamed(apart)) == ["hole"]
+
+
+def test_what_is_kept_of_a_stop_has_what_its_search_found(tmp_path: Path, apart: RigModel) -> None:
+    """The next stop begins while the search of the one before still runs."""
+    more = [one for one in passes(STOPS + 1, lambda _stop, _station: 1.0) if one[0].sequence > STOPS][:1]
+    at_once = knowing(tmp_path, [], STOPS + 1, **ALIGNED)
+    for model in (apart, at_once):
+        model.hole.catch_up()
+        add_all(model, [*moved_hole(), *more], asked=False)
+    (*_, kept), (*_, expected) = apart.hole.history.moments, at_once.hole.history.moments
+    assert (kept.number, kept.at) == (expected.number, expected.at)
+    assert kept.found.tolist() == expected.found.tolist()
     assert list(blamed(apart)) == ["hole"]

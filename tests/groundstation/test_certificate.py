@@ -33,6 +33,14 @@ def test_the_same_content_gives_the_same_bytes_and_another_day_gives_others() ->
     assert first != typeset_pdf(template_data(SHEET, PANELS, IDENTITY), date(2024, 6, 1))
 
 
+def test_number_serial_number_and_next_due_day_are_printed() -> None:
+    papers = (("Certificate", "K-17"), ("Serial number", "#9 *b*"), ("Next due", "2025-05-31"))
+    told = Identity("Tube 7", date(2024, 5, 31), "record.csv", RECORD, BLOCK, "0.1.0", papers)
+    assert json.loads(template_data(SHEET, (), told))["papers"] == [list(paper) for paper in papers]
+    pages = [typeset_png_pages(template_data(SHEET, (), one), one.day) for one in (told, IDENTITY)]
+    assert pages[0] != pages[1]
+
+
 def test_what_looks_like_markup_is_text_and_a_block_may_be_absent() -> None:
     bare = Identity("#panic()", date(2024, 5, 31), "*.csv", RECORD, None, "0.1.0")
     (page,) = typeset_png_pages(template_data(SHEET, (), bare), bare.day)

@@ -154,6 +154,29 @@ def test_at_its_depth_nothing_is_advised(end: float, std: float, word: Word, lin
     assert todo_line(found, None) == "the hole is at its depth: nothing is left to steer"
 
 
+@pytest.mark.parametrize(
+    ("unfound", "reached", "word", "told"),
+    [
+        (0.02, True, Word.ON_TARGET, False),  # less than a tenth of the limit of 45 cm
+        (0.10, True, Word.ON_TARGET, True),  # 13.5 and 10 cm are within
+        (0.32, True, Word.WATCH, True),  # 13.5 and 32 cm are not
+        (0.32, False, Word.ON_TARGET, True),  # further on the next survey shows it in time
+    ],
+)
+def test_what_one_look_alone_may_hide_at_the_toe_is_told_and_counts_at_the_end(
+    unfound: float, reached: bool, word: Word, told: bool
+) -> None:
+    bit = LENGTH if reached else 12.0
+    facts = Known(LENGTH, CURVATURE, STOP, bit, off(0.1), ending(0.3, 0.002, is_reached=reached), (), unfound)
+    found = judge_hole(facts)
+    assert found.word is word
+    said = (
+        f"one tube alone has read the last station: were it wrong there, the toe would be up to {100 * unfound:.1f} cm"
+    )
+    assert any(why.startswith(said) for why in found.why) is told
+    assert found.why[0].startswith("within 45 cm: ")
+
+
 def test_a_bit_at_the_end_is_not_steered_although_its_survey_is_to_come() -> None:
     found = judge_hole(known(0.95, bit=LENGTH, std=0.1))
     assert (found.word, found.deadline) == (Word.WATCH, None)

@@ -17,7 +17,7 @@ Open = Callable[..., Page]
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Beating]:
     """A rig whose crew has not told north, nor whether its mounts are aligned."""
-    untold = {"north_std_deg": None, "mount_tilt_std_deg": None}
+    untold = dict.fromkeys(("north_std_deg", "north_check_deg", "north_check_std_deg", "mount_tilt_std_deg"))
     with beating(tmp_path_factory.mktemp("ground"), (0.3, 0.3, 0.3), **untold) as rig:
         yield rig
 
@@ -40,6 +40,13 @@ def test_what_is_missing_is_named_told_by_a_driller_and_taken_back(rig: Beating,
     page.fill("#who", "anna")
     page.fill("#password", PASSWORD)
     page.click("#sign-now")
+    expect(page.locator("#ready")).to_have_text("NOT READY TO DRILL, not checked: north")
+    expect(page.locator("#told")).to_have_text("north was told once, check it by a second bearing")
+    expect(page.locator("#setup-items tr", has_text="north")).to_have_class("grave")
+    page.select_option("#tell-kind", "check north")
+    page.fill("#tell-angle_deg", "12.4")
+    page.fill("#tell-sigma_deg", "0.3")
+    page.click("#tell button[type=submit]")
     expect(page.locator("#ready")).to_have_text("Ready to drill: north and every joint are told")
     expect(page.locator("#word")).to_have_text("ON TARGET")
     todo = rig.served.rig.ask("setup")["todo"].partition(":")[0]
@@ -50,6 +57,10 @@ def test_what_is_missing_is_named_told_by_a_driller_and_taken_back(rig: Beating,
     expect(told).to_contain_text("0 min")
     expect(page.locator("#orders")).to_contain_text("north is 12.5 ± 0.3 deg; 3 surveys were adjusted to it")
 
+    expect(told).to_contain_text("checked by 12.4 ± 0.3 deg of anna")
+
+    page.click("#take-back")
+    expect(page.locator("#ready")).to_have_text("NOT READY TO DRILL, not checked: north")
     page.click("#take-back")
     expect(page.locator("#ready")).to_have_text("NOT READY TO DRILL, not told: north")
 

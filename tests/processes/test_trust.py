@@ -3,6 +3,7 @@
 import os
 import resource
 import signal
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,11 @@ import pytest
 from rigs import Rig, ends, free_endpoint, run, running_rig, titles_of_group
 
 from groundstation.errors import LeaseError
-from groundstation.gateway.lease import take_lease
+from groundstation.gateway.lease import RigLease
 from sim.errors import RigError
 from sim.rig.launcher import Tick, Watchdog
 from sim.rig.processes import RESTART_LIMIT, ProcessTable
-from telemetry.media.zenoh_bus import open_client, open_router
+from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
 
 pytestmark = pytest.mark.process
 
@@ -56,28 +57,32 @@ def test_a_ground_station_on_a_full_disk_stays_readable_says_so_and_loses_no_sur
     assert result["measurements"] == 6
 
 
+def fresh() -> AbstractContextManager[ZenohBus]:
+    raise AssertionError("a lease that does not lapse is not looked into")
+
+
 def test_a_second_ground_station_is_refused_by_name(tmp_path: Path) -> None:
     endpoint = free_endpoint()
     with open_router(endpoint), open_client(endpoint, timeout=20.0) as first:
-        take_lease(first, "rig-1")
+        RigLease(first, "rig-1", fresh)
         second = run("ground", "--clock", "own", "--endpoint", endpoint, "--folder", str(tmp_path / "second"))
         assert second.returncode == 1
         assert f"rig rig-1: process {os.getpid()} on " in second.stderr
         assert len(second.stderr.strip().splitlines()) == 1
         with open_client(endpoint, timeout=20.0) as other:
-            take_lease(other, "rig-2")
+            RigLease(other, "rig-2", fresh)
 
 
 def test_a_lease_ends_with_its_holder(monkeypatch: pytest.MonkeyPatch) -> None:
     endpoint = free_endpoint()
     with open_router(endpoint), open_client(endpoint, timeout=20.0) as second:
         with open_client(endpoint, timeout=20.0) as first:
-            take_lease(first, "rig-1")
+            RigLease(first, "rig-1", fresh)
             with monkeypatch.context() as hasty:
                 hasty.setattr("groundstation.gateway.lease.PATIENCE", 0.0)
                 with pytest.raises(LeaseError, match="rig rig-1"):
-                    take_lease(second, "rig-1")
-        take_lease(second, "rig-1")
+                    RigLease(second, "rig-1", fresh)
+        RigLease(second, "rig-1", fresh)
 
 
 def test_a_rig_whose_time_stands_still_is_ended_with_what_it_waits_for() -> None:

@@ -311,6 +311,7 @@ OTHER: dict[str, Any] = {
     "path.moved.from_m": 0.5,
     "path.moved.to_m": 3.0,
     "setup.untold": ["joints"],
+    "setup.unchecked": ["north"],
     "told.joint_tube": 2,
     "told.lengths_off_m": [0.5],
     "told.depth_stuck_after_s": 10.0,

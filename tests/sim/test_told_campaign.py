@@ -54,9 +54,9 @@ def test_a_joint_turns_the_yaws_below_it_and_a_mark_at_the_head_those_of_its_tim
     np.testing.assert_allclose(off_deg(drive, honest), np.where(top == 2, 5.0, 0.0), atol=0.05)
 
 
-def test_a_longer_tube_lifts_what_is_above_it() -> None:
+def test_a_longer_tube_goes_deeper_below_those_above_it() -> None:
     honest, longer = surveys_of(STRING), told(lengths_off_m=[0.25])
-    np.testing.assert_allclose(longer["md"] - honest["md"], np.where(honest["tube"] > BIT, -0.25, 0.0), atol=1e-9)
+    np.testing.assert_allclose(longer["md"] - honest["md"], np.where(honest["tube"] > BIT, 0.0, 0.25), atol=1e-9)
 
 
 def test_a_mount_that_is_tilted_is_read_as_a_rig_reads_it() -> None:

@@ -80,11 +80,32 @@ def test_a_tube_that_is_longer_lifts_those_above_it() -> None:
     honest, longer = world_of(), told(lengths_off_m=(0.0, 0.3))
     assert [longer.below(tube) for tube in range(1, 5)] == pytest.approx([0.0, 2.0, 4.3, 6.3])
     at = np.array([honest.end - 1.0])
-    bit = honest.bit_depth(float(at[0]))
+    bit = longer.bit_depth(float(at[0]))
     for tube, below in ((2, 2.0), (3, 4.3)):
         force = longer.truth(tube).force(at)[0]
         inclination = longer.scenario.hole.direction(bit - below)[0]
         assert math.acos(-force[2] / np.linalg.norm(force)) == pytest.approx(inclination, abs=1e-9)
+
+
+def test_tubes_are_added_at_one_height_so_the_bit_goes_as_far_as_they_are_long() -> None:
+    off = (0.1, -0.2, 0.3)
+    honest, longer = world_of(), told(lengths_off_m=off)
+    stops = [phase for phase in longer.phases if phase.kind == "stop"]
+    bits = [longer.bit_depth(stop.start) for stop in stops]
+    assert bits == pytest.approx([2.1, 3.9, 6.2, 8.2], abs=1e-9)
+    t = longer.ends
+    depth, rate, thrust = longer.motion.depth(t)
+    assert np.diff(depth).min() >= -1e-12
+    before, after = (longer.motion.depth(t + s * 1e-3)[0] for s in (-1.0, 1.0))
+    np.testing.assert_allclose((after - before) / 2e-3, rate, atol=2e-3 * float(np.abs(thrust).max()) + 1e-9)
+    np.testing.assert_array_equal(told(lengths_off_m=(0.0,)).motion.depth(t)[0], honest.motion.depth(t)[0])
+
+
+def test_a_second_reading_is_of_what_is_so_and_errs_by_itself() -> None:
+    found = ground_settings(told(north_deg=3.0, north_check_deg=0.2, depth_offset_m=-0.3, stick_up_check_m=0.01))
+    assert (found["north_check_deg"], found["stick_up_check_m"]) == pytest.approx((3.2, -0.29))
+    crew = ground_settings(world_of(setup={"unchecked": ("north",), "untold": ("stick-up",)}))
+    assert not [key for key in crew if "check" in key]
 
 
 def test_a_depth_that_counts_too_much_from_another_zero() -> None:

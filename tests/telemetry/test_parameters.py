@@ -52,6 +52,30 @@ def test_rows_are_sensor_axes() -> None:
     assert list(sensor.numbers())[:3] == [1.0, 0.1, 0.2]
 
 
+def test_numbers_that_all_differ_come_back_each_in_its_place() -> None:
+    """One block is enough for that, where all of a hypothesis's examples are at full size alone."""
+    numbers = iter(range(1, 200))
+
+    def vector() -> tuple[float, float, float]:
+        return float(next(numbers)), float(next(numbers)), float(next(numbers))
+
+    def matrix() -> tuple[tuple[float, float, float], ...]:
+        return vector(), vector(), vector()
+
+    sensors = [
+        SensorParameters(matrix(), vector(), (matrix(), matrix(), matrix()), matrix(), 21.0 + k)  # type: ignore[arg-type]
+        for k in range(2)
+    ]
+    block = ParameterBlock(7, 9, *sensors)
+    assert unpack_block(block.canonical()) == block
+    in_order = struct.unpack_from("<49d", block.canonical(), HEAD.size)
+    # M and its three slopes, then b and its three: as the numbers were given out, b after M
+    assert in_order[:9] == tuple(range(1, 10))
+    assert in_order[9:36] == tuple(range(13, 40))
+    assert in_order[36:39] == (10, 11, 12)
+    assert in_order[39:48] == tuple(range(40, 49))
+
+
 @given(st.binary(max_size=2 * BLOCK_SIZE))
 def test_random_bytes_are_no_block(data: bytes) -> None:
     with pytest.raises(DecodeError):

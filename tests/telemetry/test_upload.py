@@ -82,6 +82,18 @@ def test_a_change_of_anything_breaks_the_tag(change: dict) -> None:
     assert not is_authentic(replace(segment, **change), KEY)
 
 
+@pytest.mark.parametrize("byte", range(32))
+def test_every_byte_of_a_tag_counts(byte: int) -> None:
+    segment = segments()[0]
+    tag = bytearray(segment.tag)
+    for bit in range(8):
+        tag[byte] ^= 1 << bit
+        assert not is_authentic(replace(segment, tag=bytes(tag)), KEY)
+        tag[byte] ^= 1 << bit
+    assert is_authentic(replace(segment, tag=bytes(tag)), KEY)
+    assert not is_authentic(replace(segment, tag=segment.tag[: byte + 1] if byte < 31 else segment.tag + b"x"), KEY)
+
+
 def test_another_key_makes_another_tag() -> None:
     assert not is_authentic(sealed_segment(segments()[0], bytes(32)), KEY)
 

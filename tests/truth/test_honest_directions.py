@@ -88,7 +88,8 @@ def test_one_reading_of_four_that_is_far_off_is_left_out_as_an_effect_of_its_own
         looks = worlds.looks(world)
         found = adjust_hole(looks, worlds.string, worlds.path)
         pulled = np.einsum("kab,kb->ka", found.linear.weights, found.left)
-        contradicts = np.einsum("ka,ka->k", pulled, np.linalg.solve(found.redundancies, pulled[:, :, None])[:, :, 0])
+        free = found.free_parts(np.arange(len(pulled)))
+        contradicts = np.einsum("ka,ka->k", pulled, np.linalg.solve(free, pulled[:, :, None])[:, :, 0])
         assert int(np.argmax(contradicts)) == wrong
         columns = np.zeros((len(looks), 3, 3))
         columns[wrong] = np.eye(3)

@@ -11,28 +11,36 @@ from borechain.cli.calibrate.calibration_output import (
     full_scale_option,
     output_options,
 )
+from borechain.cli.calibrate.record_options import rate_option, record_options
 from borechain.cli.faults import plain_faults
-from groundstation.report.calibrations.calibration_request import AllanRequest
+from groundstation.report.calibrations.calibration_request import AllanRequest, RecordWords
 from telemetry.runtime.typed_options import gather_options
 
 
 @click.command()
 @gather_options(
     file_argument,
+    rate_option,
     click.option(
-        "--rate", type=click.FloatRange(1.0, 1e6), required=True, metavar="HZ", help="Readings per second of FILE."
+        "--sensor",
+        type=click.Choice(["gyroscope", "accelerometer", "magnetometer"]),
+        help="Sensor of the record.  [default: the first of these that it has]",
     ),
     click.option(
-        "--unit", default="deg/s", show_default=True, help="Unit of FILE, shown in the report; nothing is converted."
+        "--unit",
+        default="",
+        help="Unit of the answer, and of the columns x,y,z.  [default: that of the record, else deg/s]",
     ),
+    *record_options,
     full_scale_option,
     *output_options,
     wanted=WantedFiles,
+    words=RecordWords,
     request=AllanRequest,
 )
 @plain_faults
 def allan(request: AllanRequest, wanted: WantedFiles) -> None:
-    """Allan deviation of a static record: a CSV with the columns x,y,z, or an .npy of shape (n, 3).
+    """Allan deviation of a static record of an IMU, as its logger wrote it (docs/calibration.md).
 
     Angle random walk N and bias floor F are fitted, with 95 % intervals; the values read off the curve are given too.
 
@@ -40,5 +48,7 @@ def allan(request: AllanRequest, wanted: WantedFiles) -> None:
     Examples:
       borechain experiment records --out out/records
       borechain allan out/records/static.npy --rate 65 --plot out/allan.svg
+      borechain allan counts.npy --rate 100 --gyro '0.05 deg/s'
+      borechain allan logger.csv --sensor accelerometer --from 60 --without 120..130
     """
     deliver_calibration(request, wanted)

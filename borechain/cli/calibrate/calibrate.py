@@ -6,6 +6,9 @@ import click
 
 from borechain.cli.calibrate.linear import attitudes, turntable
 from borechain.cli.calibrate.mwd import magnetometer, mwd, qc
+from borechain.cli.calibrate.record_reader import record_reader
+from borechain.cli.calibrate.rests_command import rests
+from borechain.cli.calibrate.temperature_command import temperature
 
 
 @click.group()
@@ -23,5 +26,5 @@ def calibrate() -> None:
     """
 
 
-for command in (turntable, attitudes, mwd, magnetometer, qc):
+for command in (turntable, attitudes, mwd, magnetometer, qc, record_reader, rests, temperature):
     calibrate.add_command(command)

@@ -32,6 +32,9 @@ full_scale_option = click.option(
     default=1e30,
     help="Range of the sensor, in the unit of its readings; a saturated reading is refused.",
 )
+force_option = click.option(
+    "--force", is_flag=True, help="Land a calibration that a gate refuses; its file and certificate say so."
+)
 PATH = click.Path(path_type=Path, dir_okay=False)
 output_options = (
     click.option("--out", type=PATH, help="Result as a .json file, with the record it was made from."),
@@ -39,6 +42,9 @@ output_options = (
     click.option("--certificate", type=PATH, help="Certificate as PDF."),
     click.option("--date", type=click.DateTime(["%Y-%m-%d"]), help="Day of the calibration.  [default: today, UTC]"),
     click.option("--subject", help="What was calibrated, for the certificate.  [default: name of FILE]"),
+    click.option("--serial", default="", help="Serial number of what was calibrated, for the certificate."),
+    click.option("--number", default="", help="Number of the certificate."),
+    click.option("--due", type=click.DateTime(["%Y-%m-%d"]), help="Day of the next calibration, for the certificate."),
     json_option,
 )  # of WantedFiles
 
@@ -54,34 +60,51 @@ class WantedFiles:
     date: datetime.datetime | None
     subject: str | None
     as_json: bool
+    serial: str = ""
+    number: str = ""
+    due: datetime.datetime | None = None
 
     @property
     def day(self) -> datetime.date:
         """Day of the calibration, that of today in UTC by default."""
         return (self.date or datetime.datetime.now(datetime.UTC)).date()
 
-    def check(self) -> None:
+    @property
+    def papers(self) -> tuple[tuple[str, str], ...]:
+        """What the laboratory's books say of the certificate, as far as it is told."""
+        due = self.due.date().isoformat() if self.due is not None else ""
+        told = (("Certificate", self.number), ("Serial number", self.serial), ("Next due", due))
+        return tuple((name, text) for name, text in told if text)
+
+    def check(self, *more: Path) -> None:
         """Refuse paths that cannot be meant, and what is not installed, before anything is computed."""
-        paths = [self.file, *filter(None, (self.out, self.plot, self.certificate))]
+        paths = [self.file, *more, *filter(None, (self.out, self.plot, self.certificate))]
         if len({path.resolve() for path in paths}) < len(paths):
             raise InputFault("expected different files for the record, --out, --plot and --certificate")
+        if self.due is not None and self.due.date() <= self.day:
+            raise InputFault(f"--due: expected a day after that of the calibration, {self.day}, got {self.due.date()}")
         check_suffix("--plot", self.plot, *PLOT_FORMATS)
         check_suffix("--certificate", self.certificate, ".pdf")
-        check_suffix("--out", self.out, ".json")
+        for path in (self.out, *more):
+            check_suffix("--out", path, ".json")
         if self.plot is not None or self.certificate is not None:
             check_installed("matplotlib", "typst")
 
 
-def deliver_calibration(request: CalibrationRequest, wanted: WantedFiles) -> None:
-    """Calibrate, make every file, land them all, then print."""
+def deliver_calibration(request: CalibrationRequest, wanted: WantedFiles, gyroscope_out: Path | None = None) -> None:
+    """Calibrate, make every file, land them all, then print; ``gyroscope_out`` of a record of two sensors."""
     from borechain import api
 
-    wanted.check()
+    wanted.check(*filter(None, (gyroscope_out,)))
     day = wanted.day
     outcome = api.calibrate(request, day)
     files: dict[Path, bytes] = {}
     if wanted.out is not None:
         files[wanted.out] = outcome.document.encode()
+    if gyroscope_out is not None:
+        if outcome.gyroscope_document is None:
+            raise InputFault(f"--gyroscope-out: {outcome.result['why_no_gyroscope']}")
+        files[gyroscope_out] = outcome.gyroscope_document.encode()
     if wanted.plot is not None or wanted.certificate is not None:
         files |= rendered_files(outcome, wanted, day)
     write_files_whole(files)
@@ -101,7 +124,8 @@ def rendered_files(outcome: CalibrationOutcome, wanted: WantedFiles, day: dateti
         files[wanted.plot] = render_panels(panels, wanted.plot.suffix[1:])
     if wanted.certificate is not None:
         subject, record = wanted.subject or wanted.file.stem, wanted.file
-        identity = Identity(subject, day, record.name, outcome.record_sha256, outcome.block_sha256, __version__)
+        hashes = (outcome.record_sha256, outcome.block_sha256)
+        identity = Identity(subject, day, record.name, *hashes, __version__, wanted.papers)
         files[wanted.certificate] = certificate_pdf(outcome.sheet, panels, identity)
     return files
 

@@ -10,6 +10,7 @@ from borechain.cli.calibrate.calibration_output import (
     WantedFiles,
     deliver_calibration,
     file_argument,
+    force_option,
     full_scale_option,
     output_options,
 )
@@ -40,6 +41,7 @@ temperature_option = click.option("--temperature-c", type=float, help="Temperatu
     jig_option,
     temperature_option,
     full_scale_option,
+    force_option,
     *output_options,
     wanted=WantedFiles,
     request=TurntableRequest,
@@ -69,6 +71,7 @@ def turntable(request: TurntableRequest, wanted: WantedFiles) -> None:
     jig_option,
     temperature_option,
     full_scale_option,
+    force_option,
     *output_options,
     wanted=WantedFiles,
     request=AttitudesRequest,

@@ -10,6 +10,7 @@ from borechain.cli.calibrate.calibration_output import (
     WantedFiles,
     deliver_calibration,
     file_argument,
+    force_option,
     full_scale_option,
     output_options,
 )
@@ -39,6 +40,7 @@ accelerometers_option = click.option(
     ),
     jig_option,
     full_scale_option,
+    force_option,
     *output_options,
     wanted=WantedFiles,
     request=MwdRequest,
@@ -69,6 +71,7 @@ def mwd(request: MwdRequest, wanted: WantedFiles) -> None:
     ),
     click.option("--dip-deg", type=click.FloatRange(-90.0, 90.0), help="Dip of the site's field below the horizontal."),
     full_scale_option,
+    force_option,
     *output_options,
     wanted=WantedFiles,
     request=MagnetometerRequest,

@@ -87,9 +87,10 @@ def check(request: CheckRequest, as_json: bool) -> None:
 
 
 def check_text(found: SetupCheck) -> str:
-    """The answer for people: the word, what is missing, wrong, or costs most, what to do next, what no sigma holds."""
+    """The answer for people: the word, what is missing, unchecked, wrong, or costs most, and what to do next."""
     lines = ["READY TO DRILL" if found.ready else "NOT READY TO DRILL"]
     lines += [f"missing  {name}" for name in found.missing]
+    lines += [f"check    {row['item']}, {row['check']}" for row in found.items if row["item"] in found.unchecked]
     lines += [f"wrong    {why}" for why in found.wrong]
     assumed: dict[str, list[dict[str, Any]]] = {}
     for row in found.items:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import contextlib
 import json
 import signal
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from groundstation.recording.recorder import RecordingSummary
     from telemetry.media.zenoh_bus import ZenohBus
 
+DAMAGE_SHOWN = 20  # lines
 ONE_TRY = 2.0  # wall s to join a router that may not be there yet
 
 
@@ -126,6 +128,9 @@ def replay(file: Path, folder: Path | None, page: str | None, speed: float, as_j
       borechain replay shift.mcap
       borechain replay shift.mcap --json
       borechain replay shift.mcap --page 127.0.0.1:8080 --speed 60
+
+    \b
+    Exit status: 0 for a whole recording, 1 for one that is cut or damaged: what could be read is shown all the same.
     """
     from groundstation.recording.recording_file import Recording
 
@@ -138,16 +143,34 @@ def replay(file: Path, folder: Path | None, page: str | None, speed: float, as_j
             from groundstation.recording.show import show_recording
 
             show_recording(recording, folder or Path(place), replace(shown, replay=file.name), speed)
+            tell_damage([one.line for one in recording.damage])
             return
         from borechain import api
 
         result = api.replay(recording, folder or Path(place))
     if as_json:
         click.echo(json.dumps(result))
-        return
+    else:
+        print_replay(result)
+    if not result["whole"]:
+        sys.exit(EnvironmentFault.exit_code)
+
+
+def print_replay(result: dict[str, Any]) -> None:
+    """Print what a replay knows, and what its recording has lost."""
     for station in result["stations"]:
         lean = f"{station['inclination_deg']:.3f} deg to {station['azimuth_deg']:.2f} deg"
         click.echo(f"station {station['station']} at {station['md_m']:.2f} m: {lean}")
     click.echo(result["verdict"]["line"])
-    click.echo(f"{result['events']} events, {result['missing']} missing; {'whole' if result['whole'] else 'cut'} file")
+    file = "damaged" if result["damage"] else "whole" if result["whole"] else "cut"
+    click.echo(f"{result['events']} events, {result['missing']} missing; {file} file")
+    tell_damage(result["damage"])
     click.echo(f"digest {result['digest']}")
+
+
+def tell_damage(lines: list[str]) -> None:
+    """Say on the error stream which parts of a recording could not be read."""
+    for line in lines[:DAMAGE_SHOWN]:
+        click.echo(line, err=True)
+    if len(lines) > DAMAGE_SHOWN:
+        click.echo(f"and {len(lines) - DAMAGE_SHOWN} more damaged parts", err=True)

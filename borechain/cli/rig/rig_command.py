@@ -31,6 +31,13 @@ rig_options = gather_options(
         "--inline", is_flag=True, help="Run it all in this one process, without a bus: same result, less CPU."
     ),
     click.option(
+        "--chip",
+        "chips",
+        default="",
+        metavar="all|N,N",
+        help="Tubes whose node steps on an emulated Cortex-M4, in the integers of the kernel fixed (QEMU).",
+    ),
+    click.option(
         "--transport",
         type=click.Choice(["zenoh", "can", "can-classic", "mixed", "can-native"]),
         help="Medium of the joints: mixed has the first three in turn, can-native rounds as the native profile does "
@@ -76,6 +83,7 @@ def rig(job: RigJob, page: PageRequest, view: str | None, as_json: bool) -> None
       borechain rig wellbore-1
       borechain rig wellbore-1 --speed 1 --fault kill-node:3@900
       borechain rig rig-3 --transport can
+      borechain rig rig-3 --chip 2
       borechain rig rig-3 --keys stick
       borechain rig wellbore-1 --speed 5 --page 127.0.0.1:8080
       borechain rig three-holes --inline --view log

@@ -1,8 +1,8 @@
 """Kinds of blunders, each in three sizes: what becomes of the scenario of a rig, and by which name it is to be found.
 
-What was told once of north, of the stick-up and of lengths is in no reading, or hardly: all are the same, or are moved
-alike, whatever is so. Of such a kind the smallest size is one that its stated sigma makes plausible; the others
-are not, and stand in the table as what no reading can show, with the check beside the readings that would.
+What is told of north and of the stick-up is in no reading, or hardly: all are the same, or are moved alike, whatever is
+so. A crew checks it by a second reading, which errs as the first may; where it does not, it is told that nothing does.
+The small step of the lowest tube at the last stop is in no other look, until the next stop.
 
 The middle of the schedule is when the fifth tube has been drilled; what steps or slips does so then, in a tube that
 passes half of the stations afterwards.
@@ -87,6 +87,21 @@ def of_tube(tube: int, size: float) -> tuple[float, ...]:
     return tuple(size * (number == tube) for number in range(1, TUBES + 1))
 
 
+def leave_unchecked(name: str, change: Change) -> Change:
+    """The same, by a crew that takes no second reading of it."""
+    return lambda tables, size: change_tables(change(tables, size), setup={"unchecked": (name,)})
+
+
+def north_told(tables: Tables, deg: float) -> Tables:
+    """North is told wrong."""
+    return of_told(lambda size: {"north_deg": size})(tables, deg)
+
+
+def stick_up_told(tables: Tables, m: float) -> Tables:
+    """The stick-up is told too high."""
+    return of_told(lambda size: {"depth_offset_m": -size})(tables, m)
+
+
 def moved_stretch(size: float) -> dict[str, Any]:
     """A stretch of the hole about two stations leans over."""
     return {"moved": {"after_s": MIDDLE_S, "from_m": 5.5, "to_m": 8.5, "north_deg": size}}
@@ -169,9 +184,9 @@ KINDS: Final[tuple[PlantedBlunder, ...]] = (
         "joints untold", "", (0.0, 1.0, 2.0),
         of_section("setup", lambda _: {"untold": ("joints",)}), JOINT,
     ),
+    PlantedBlunder("north wrong", "deg", (0.2, 1.0, 90.0), north_told, (K.COLLAR_WRONG,)),
     PlantedBlunder(
-        "north wrong", "deg", (0.2, 1.0, 90.0), of_told(lambda deg: {"north_deg": deg}),
-        (K.COLLAR_WRONG,), seen_by="a second bearing",
+        "north wrong and unchecked", "deg", (0.2, 1.0, 90.0), leave_unchecked("north", north_told), (K.COLLAR_WRONG,)
     ),
     PlantedBlunder(
         "north untold", "", (0.0, 1.0, 2.0), of_section("setup", lambda _: {"untold": ("north",)}), JOINT
@@ -180,9 +195,9 @@ KINDS: Final[tuple[PlantedBlunder, ...]] = (
         "collar wrong", "deg", (0.5, 2.0, 8.0), of_told(lambda deg: {"collar_north_deg": deg}),
         (K.COLLAR_WRONG,),
     ),
+    PlantedBlunder("stick-up told too high", "m", (0.02, 0.3, 2.0), stick_up_told, DEPTH),
     PlantedBlunder(
-        "stick-up told too high", "m", (0.02, 0.3, 2.0),
-        of_told(lambda m: {"depth_offset_m": -m}), DEPTH, seen_by="the bit at the collar's edge",
+        "stick-up told too high and unchecked", "m", (0.02, 0.3, 2.0), leave_unchecked("stick-up", stick_up_told), DEPTH
     ),
     PlantedBlunder(
         "collar untold", "", (0.0, 1.0, 2.0),
@@ -190,7 +205,7 @@ KINDS: Final[tuple[PlantedBlunder, ...]] = (
     ),
     PlantedBlunder(
         "tube longer", "m", (0.002, 0.1, 0.5),
-        of_told(lambda m: {"lengths_off_m": of_tube(TUBE, m)}), DEPTH, seen_by="a tape along the tube",
+        of_told(lambda m: {"lengths_off_m": of_tube(TUBE, m)}), DEPTH,
     ),
     PlantedBlunder("depth scale", "", (0.002, 0.02, 0.1), of_told(lambda part: {"depth_scale": part}), DEPTH),
     PlantedBlunder("stick-up told too low", "m", (0.02, 0.3, 2.0), of_told(lambda m: {"depth_offset_m": m}), DEPTH),

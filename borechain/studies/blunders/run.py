@@ -2,7 +2,8 @@
 
 Rigs are those of the study ``set-up``, each with one blunder of a kind and a size beside what is drawn. The worst
 error of a station, direction or position, is counted in what is stated of it. Beyond three standard deviations a hole
-may not be ON TARGET without a word: that is ``missed``, or ``unseen`` where only a check beside the readings sees it.
+may not be ON TARGET without a word: that is ``missed``. What the last look alone may hide is told beside the sigma, and
+counts there.
 """
 
 from __future__ import annotations
@@ -86,11 +87,9 @@ def run_rig(job: BlunderJob) -> BlunderRun:
     world = World(scenario_of(dict(tables_with(job))), job.draw.seed)
     with heard_ground(world, IN_ONE) as ground:
         judged = judge_hole_of(world, ground.model.hole)
-        # of a direction with two degrees of freedom and a position with three, as a normal number is beyond its sigma
-        squares = np.concatenate([judged.direction_squares / 2.0, judged.ellipsoid_squares / 3.0])
+        direction, worst = judged.worst_sigmas()
         toe = 1e3 * float(np.linalg.norm(judged.error[-1, :2])) if len(judged.md) else math.nan
-        direction = float(np.sqrt(0.5 * judged.direction_squares.max(initial=0.0)))
-        return BlunderRun(float(np.sqrt(squares.max(initial=0.0))), direction, toe, answer_of(ground))
+        return BlunderRun(worst, direction, toe, answer_of(ground))
 
 
 def outcome_of(run: BlunderRun, named: Sequence[str], seen_by: str = "") -> str:

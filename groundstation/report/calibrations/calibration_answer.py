@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from groundstation.report.calibrations.allan_outcome import answer_allan
 from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome
 from groundstation.report.calibrations.calibration_request import (
@@ -10,10 +13,15 @@ from groundstation.report.calibrations.calibration_request import (
     CalibrationRequest,
     MagnetometerRequest,
     MwdRequest,
+    QualityRequest,
+    RestsRequest,
+    TemperatureRequest,
     TurntableRequest,
 )
 from groundstation.report.calibrations.linear_outcome import answer_attitudes, answer_turntable
 from groundstation.report.calibrations.quality_outcome import answer_quality
+from groundstation.report.calibrations.rests_outcome import answer_rests
+from groundstation.report.calibrations.temperature_outcome import answer_temperature
 from groundstation.report.calibrations.triad_outcome import answer_magnetometer, answer_mwd
 
 
@@ -25,16 +33,14 @@ def answer_calibration(request: CalibrationRequest, day: str) -> CalibrationOutc
     CalibrationError
         The file and line, what was expected and what came.
     """
-    match request:
-        case TurntableRequest():
-            return answer_turntable(request, day)
-        case AttitudesRequest():
-            return answer_attitudes(request, day)
-        case MwdRequest():
-            return answer_mwd(request, day)
-        case MagnetometerRequest():
-            return answer_magnetometer(request, day)
-        case AllanRequest():
-            return answer_allan(request, day)
-        case _:
-            return answer_quality(request, day)
+    answers: dict[type, Callable[[Any, str], CalibrationOutcome]] = {
+        TurntableRequest: answer_turntable,
+        AttitudesRequest: answer_attitudes,
+        MwdRequest: answer_mwd,
+        MagnetometerRequest: answer_magnetometer,
+        AllanRequest: answer_allan,
+        RestsRequest: answer_rests,
+        QualityRequest: answer_quality,
+        TemperatureRequest: answer_temperature,
+    }
+    return answers[type(request)](request, day)

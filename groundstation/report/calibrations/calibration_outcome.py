@@ -25,6 +25,7 @@ class CalibrationOutcome:
     record_sha256: str
     sheet: Sheet
     panels: Callable[[], Sequence[Panel]]
+    gyroscope_document: str | None = None  # of a record that calibrates two sensors
 
 
 @contextlib.contextmanager

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from groundstation.calibration.jig import Jig
+    from telemetry.records.record_reading import RecordReading
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
 UNITS = {  # SI of one unit of the file, and whose unit it is
@@ -38,6 +39,7 @@ class TurntableRequest:
     jig_deg: JigFigures = None
     temperature_c: float | None = None
     full_scale: float = NO_LIMIT
+    force: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +51,7 @@ class AttitudesRequest:
     jig_deg: JigFigures = None
     temperature_c: float | None = None
     full_scale: float = NO_LIMIT
+    force: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +63,7 @@ class MwdRequest:
     tool_face: bool = False
     jig_deg: JigFigures = None
     full_scale: float = NO_LIMIT
+    force: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +76,7 @@ class MagnetometerRequest:
     field_ut: float | None = None
     dip_deg: float | None = None
     full_scale: float = NO_LIMIT
+    force: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,15 +90,77 @@ class QualityRequest:
 
 
 @dataclass(frozen=True, slots=True)
+class RecordWords:
+    """What is told of an IMU's record in words, as ``telemetry.records.record_reading`` reads them."""
+
+    columns: str = ""
+    gyro: str = ""
+    accel: str = ""
+    mag: str = ""
+    begin: float = 0.0
+    end: float = math.inf
+    without: tuple[str, ...] = ()
+
+    def to_reading(self, rate: float | None = None) -> RecordReading:
+        """The reading that is meant, of a record of ``rate`` rows a second.
+
+        Raises
+        ------
+        RecordError
+            When a word cannot be meant; the message names it.
+        """
+        from telemetry.records.record_reading import reading_of
+
+        return reading_of(
+            self.columns, self.gyro, self.accel, self.mag, rate or 0.0, self.begin, self.end, self.without
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class AllanRequest:
-    """A static record of ``rate`` readings a second."""
+    """A static record of ``rate`` readings a second, where it has no times; ``unit`` is that of the answer.
+
+    Where the columns have no unit either it is that of the file too, deg/s by default.
+    """
 
     file: Path
-    rate: float
-    unit: str = "deg/s"
+    rate: float | None = None
+    unit: str = ""
+    sensor: str | None = None
     full_scale: float = NO_LIMIT
+    words: RecordWords = RecordWords()
+
+
+@dataclass(frozen=True, slots=True)
+class RestsRequest:
+    """An IMU laid down at attitudes that are not known; ``gravity`` (m/s^2) of the place."""
+
+    file: Path
+    gravity: float = STANDARD_GRAVITY
+    rate: float | None = None
+    force: bool = False
+    words: RecordWords = RecordWords()
+
+
+@dataclass(frozen=True, slots=True)
+class TemperatureRequest:
+    """A triad at known truths and several temperatures; ``unit`` of the file, degrees of the polynomials."""
+
+    file: Path
+    unit: str = "deg/s"
+    bias_degree: int = 2
+    matrix_degree: int = 1
+    full_scale: float = NO_LIMIT
+    force: bool = False
 
 
 CalibrationRequest = (
-    TurntableRequest | AttitudesRequest | MwdRequest | MagnetometerRequest | QualityRequest | AllanRequest
+    TurntableRequest
+    | AttitudesRequest
+    | MwdRequest
+    | MagnetometerRequest
+    | QualityRequest
+    | AllanRequest
+    | RestsRequest
+    | TemperatureRequest
 )

@@ -13,6 +13,7 @@ from groundstation.calibration.attitudes import AttitudeFit, fit_attitudes, fit_
 from groundstation.calibration.block import Calibration, Provenance, to_json
 from groundstation.calibration.calibration_records import read_attitudes, read_turn_table
 from groundstation.calibration.coverage import COVERAGE
+from groundstation.calibration.landing_gates import linear_gates, pass_gates
 from groundstation.calibration.matrix_files import read_matrix
 from groundstation.calibration.temperature import Array
 from groundstation.calibration.turntable import SETTINGS, as_observations, correct_readings, turntable_alignment
@@ -45,6 +46,7 @@ class LinearCalibration:
     sensor: str
     design: str
     record_sha256: str
+    forced: tuple[str, ...] = ()  # what its gates found, and was overruled
 
 
 def answer_turntable(request: TurntableRequest, day: str) -> CalibrationOutcome:
@@ -74,7 +76,9 @@ def answer_turntable(request: TurntableRequest, day: str) -> CalibrationOutcome:
         design=f"turn table, two rotations about each axis at {request.reference:g} {request.unit}",
         record_sha256=record.sha256,
     )
-    return linear_outcome(job, day, request.temperature_c, {"reference": request.reference})
+    return linear_outcome(
+        judged_calibration(job, request), day, request.temperature_c, {"reference": request.reference}
+    )
 
 
 def answer_attitudes(request: AttitudesRequest, day: str) -> CalibrationOutcome:
@@ -108,7 +112,23 @@ def answer_attitudes(request: AttitudesRequest, day: str) -> CalibrationOutcome:
         beside = [[None if math.isnan(v) else v for v in row] for row in (found.matrix - like).tolist()]
         extra = {"yaw_deg": math.degrees(found.yaw), "yaw_std_deg": math.degrees(found.yaw_std)}
         extra["reference_difference"] = beside
-    return linear_outcome(job, day, request.temperature_c, extra)
+    return linear_outcome(judged_calibration(job, request), day, request.temperature_c, extra)
+
+
+def judged_calibration(job: LinearCalibration, request: TurntableRequest | AttitudesRequest) -> LinearCalibration:
+    """The calibration with what its gates found.
+
+    Raises
+    ------
+    CalibrationError
+        When a gate does not hold and nothing forces it.
+    """
+    nominal, stated = job.truth_si / job.reading_si, jig_of(request.jig_deg)
+    jig = 0.0 if stated is None else math.hypot(stated.common, stated.random)
+    with naming_file(request.file):
+        gates = linear_gates(job.truth, job.readings, job.names, job.fit, nominal, job.reading_si, job.sensor, jig)
+        forced = pass_gates(gates, force=request.force)
+    return replace(job, forced=forced, design=job.design + "".join(f"; forced past {found}" for found in forced))
 
 
 def linear_outcome(
@@ -121,6 +141,7 @@ def linear_outcome(
     factor = fit.coverage_factor() if fit.combined is None else None
     if "yaw_deg" in extra:
         facts.append(("Yaw of the rig", f"{extra['yaw_deg']:.4f} deg, standard error {extra['yaw_std_deg']:.4f} deg"))
+    facts.extend(("Forced past", found) for found in job.forced)
     sheet = linear_sheet(f"Calibration of {job.sensor}", fit, at, job.matrix_unit, facts)
     result = {
         "sensor": job.sensor,
@@ -146,6 +167,7 @@ def linear_outcome(
         **extra,
         "warnings": list(sheet.warnings),
         "design": job.design,
+        "forced": list(job.forced),
         "temperature_c": temperature_c,
         "date": day,
         "record_sha256": job.record_sha256,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.calibration.jig import Jig
+from groundstation.calibration.landing_gates import Gate, face_gate, pass_gates, rows_twice, triad_gates
 from groundstation.calibration.mwd_block import of_fit, to_json
 from groundstation.calibration.mwd_files import MwdRecord, read_mwd
 from groundstation.calibration.mwd_model import (
@@ -16,13 +17,14 @@ from groundstation.calibration.mwd_model import (
     gravity_inclination,
     magnetic_dip,
     nominal_triad,
+    tool_face,
     vectors_of_volts,
 )
 from groundstation.calibration.mwd_record import ACCELEROMETER_VOLTS_PER_G, MAGNETOMETER_VOLTS_PER_MICROTESLA
 from groundstation.calibration.mwd_solve import MwdErrors, MwdFit, solve_accelerometers, solve_magnetometers
 from groundstation.calibration.temperature import Array
 from groundstation.report.calibration_sheets import TriadErrors, triad_sheet
-from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome
+from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome, naming_file
 from groundstation.report.calibrations.calibration_request import MagnetometerRequest, MwdRequest, jig_of
 from groundstation.report.calibrations.triad_files import (
     ACCELEROMETERS,
@@ -43,7 +45,13 @@ def answer_mwd(request: MwdRequest, day: str) -> CalibrationOutcome:
     """
     record = read_mwd(request.file, request.full_scale)
     fit = solve_gravity(record, int(request.parameters), tool_face=request.tool_face, jig=jig_of(request.jig_deg))
-    return triad_outcome(record, fit, day, errors_of_gravity(record, fit), {"reference": "1 g and the jig's tilt"})
+    faces = tool_face(vectors_of_volts(fit.triad, record.gravity_volts, record.temperature))
+    gates = [*triad_gates(fit.after.size_rms, fit.after.angle_rms, "G"), twice_gate(record)]
+    gates.append(face_gate(faces, record.tool_face, record.tilt))
+    with naming_file(request.file):
+        forced = pass_gates(gates, force=request.force)
+    reference = {"reference": "1 g and the jig's tilt"}
+    return triad_outcome(record, fit, day, errors_of_gravity(record, fit), reference, forced)
 
 
 def answer_magnetometer(request: MagnetometerRequest, day: str) -> CalibrationOutcome:
@@ -60,7 +68,18 @@ def answer_magnetometer(request: MagnetometerRequest, day: str) -> CalibrationOu
         raise record.located(error) from error
     source = "the same record" if block is None else calibration_label(request.accelerometers, block)
     extra = {"reference": f"field and dip of the site, vertical by accelerometers of {source}"}
-    return triad_outcome(record, fit, day, errors_of_field(record, fit, gravity, size, dip), extra)
+    gates = [*triad_gates(fit.after.size_rms / float(np.mean(size)), fit.after.angle_rms, "H"), twice_gate(record)]
+    with naming_file(request.file):
+        forced = pass_gates(gates, force=request.force)
+    return triad_outcome(record, fit, day, errors_of_field(record, fit, gravity, size, dip), extra, forced)
+
+
+def twice_gate(record: MwdRecord) -> Gate:
+    """Whether no reading of a record stands in it twice."""
+    columns = [record.tilt, record.tool_face, record.temperature, *record.gravity_volts.T]
+    pairs = rows_twice(np.column_stack(columns))
+    lines = [record.lines[k] for k in pairs[0]] if pairs else []
+    return Gate("duplicates", not pairs, f"{len(pairs)} readings stand twice, as in lines {lines}")
 
 
 def solve_gravity(record: MwdRecord, parameters: int, *, tool_face: bool = False, jig: Jig | None = None) -> MwdFit:
@@ -112,13 +131,19 @@ def errors_of_field(
 
 
 def triad_outcome(
-    record: MwdRecord, fit: MwdFit, day: str, errors: tuple[TriadErrors, TriadErrors], extra: dict[str, str]
+    record: MwdRecord,
+    fit: MwdFit,
+    day: str,
+    errors: tuple[TriadErrors, TriadErrors],
+    extra: dict[str, str],
+    forced: tuple[str, ...],
 ) -> CalibrationOutcome:
     """File, JSON, sheet and figures of a triad."""
     gravity = fit.triad.axes == "ABC"
     unit, angle = ("g", "tilt_deg") if gravity else ("ut", "dip_deg")
     after = errors_json(fit.after, unit, angle)
     design = f"{len(record.lines)} attitudes, {fit.parameters} parameters"
+    design += "".join(f"; forced past {found}" for found in forced)
     provenance = {"record_sha256": record.sha256, "day": day, "design": design, "cost": fit.cost, "errors": after}
     block = of_fit(fit, ACCELEROMETERS if gravity else MAGNETOMETERS, provenance | extra)
     result = {
@@ -136,12 +161,14 @@ def triad_outcome(
         "temperature_c": list(fit.temperatures),
         "warnings": list(fit.warnings),
         "design": design,
+        "forced": list(forced),
         **extra,
         "date": day,
         "record_sha256": record.sha256,
         "block_sha256": block.sha256(),
     }
     facts = [("Record of", design), ("Reference", extra["reference"])]
+    facts.extend(("Forced past", found) for found in forced)
     sheet = triad_sheet(f"Calibration of {block.sensor.replace('mwd', 'MWD')}", fit, facts)
 
     def panels() -> Sequence[Any]:

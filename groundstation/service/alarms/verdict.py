@@ -3,7 +3,8 @@
 One of five words, a function of what is known and of nothing else. The four that are about the hole are chances:
 
 ON TARGET   it ends within its limit with 95 % or more
-WATCH       with less, but the depth by which a correction must begin lies behind the next survey
+WATCH       with less, but the depth by which a correction must begin lies behind the next survey; or at its depth
+            it ends within, unless the one look at its last station is wrong
 STEER       with less than 50 % and steering helps, or that depth comes before the next survey, or has been passed
 OUT         a station is beyond its limit, or even with a correction from now on it ends within with less than 50 %
 
@@ -28,6 +29,7 @@ LOWEST, _, LIMIT = LEVELS  # of the tolerance, of what was drilled
 SURE = 0.95  # chance of ending within, from which on it is on target; a correction is to bring it there
 EVEN = 0.5  # chance below which it is more likely out than in
 SURELY = 2.0  # standard deviations
+WORTH_TELLING = 0.1  # of the limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,7 @@ class Known:
     worst: Deviation | None = None  # of the stations surveyed, the one that uses most of its tolerance
     projection: ProjectedEnd | None = None  # at the target, if the hole goes on as it tends to
     doubts: tuple[tuple[VerdictDoubt, str], ...] = ()
+    unfound: float = 0.0  # m by which the toe may be off if the tube errs that read the last station alone
 
     @property
     def is_at_end(self) -> bool:
@@ -131,7 +134,20 @@ def judge_surveys(known: Known) -> HoleVerdict:
         return HoleVerdict(Word.WATCH, Word.WATCH, (why,), (), "deviation", worst, is_at_end=known.is_at_end)
     deadline = None if known.is_at_end or end.within >= SURE else correction_deadline(end, known)
     word, why = _word_of(end, deadline, known.stop)
-    return HoleVerdict(word, word, (why,), (), "projection", end.ends, end, deadline, known.is_at_end)
+    reasons = (why, *_say_look_alone(end, known))
+    if word is Word.ON_TARGET and known.is_at_end and math.hypot(*end.ends.offset) + known.unfound > end.limit:
+        word = Word.WATCH
+    return HoleVerdict(word, word, reasons, (), "projection", end.ends, end, deadline, known.is_at_end)
+
+
+def _say_look_alone(end: ProjectedEnd, known: Known) -> tuple[str, ...]:
+    """What a mistake of the one tube that has read the last station may do, where that is a good part of the limit."""
+    if known.unfound < WORTH_TELLING * end.limit:
+        return ()
+    return (
+        f"one tube alone has read the last station: were it wrong there, the toe would be up to "
+        f"{100.0 * known.unfound:.1f} cm off; the next survey shows it, or one with the string lifted by a tube",
+    )
 
 
 def _word_of(end: ProjectedEnd, deadline: Deadline | None, stop: float) -> tuple[Word, str]:

@@ -13,6 +13,12 @@ from groundstation.service.hole.examined_hole import UNSOLVED
 from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.service.setup.readiness import told_briefly
 from groundstation.service.setup.setup_book import SetupBook
+from groundstation.service.setup.setup_checks import (
+    contradicted_kinds,
+    say_contradiction,
+    say_unchecked,
+    unchecked_kinds,
+)
 from groundstation.service.setup.setup_items import missing_names, setup_items
 from groundstation.service.string.known_string import KnownString
 
@@ -22,6 +28,7 @@ ALARMS = {
     "depth_contradicts": VerdictDoubt.DEPTH,
     "depth_silent": VerdictDoubt.STALE,
     "clock": VerdictDoubt.CLOCK,
+    "lease": VerdictDoubt.STALE,
 }
 
 
@@ -38,6 +45,7 @@ def known_of(
         bit=string.bit,
         worst=worst,
         projection=hole.projection if worst is not None else None,
+        unfound=_unfound_by_look(hole),
         doubts=(
             *_doubts_of_setup(config, setup, string),
             *_doubts_of_time(string, alarms, config.stale_after),
@@ -47,10 +55,21 @@ def known_of(
     )
 
 
+def _unfound_by_look(hole: SurveyedHole) -> float:
+    """By how much (m) the toe may be off if the tube errs that read the last station alone."""
+    examined = hole.examined if hole.is_adjusted else None
+    alone = None if examined is None else examined.last_look
+    return 0.0 if alone is None else alone.toe
+
+
 def _doubts_of_setup(config: GroundConfig, setup: SetupBook, string: KnownString) -> Iterator[tuple[VerdictDoubt, str]]:
-    """Without north, or the angle of a joint, no azimuth is known."""
+    """Without north, or the angle of a joint, no azimuth is known; what was told once may be a slip."""
     if missing := missing_names(setup_items(config, setup, string)):
         yield VerdictDoubt.SETUP, f"not told: {told_briefly(missing)}"
+    for kind in contradicted_kinds(setup):
+        yield VerdictDoubt.CONTRADICTION, say_contradiction(setup, kind)
+    if unchecked := unchecked_kinds(setup):
+        yield VerdictDoubt.UNCHECKED, say_unchecked(unchecked)
 
 
 def _doubts_of_surveys(

@@ -27,4 +27,5 @@ class VerdictDoubt(enum.StrEnum):
     YAW = "yaw"
     UNCERTAIN = "uncertain"
     SETUP = "setup"
+    UNCHECKED = "unchecked"
     CONTRADICTION = "contradiction"

@@ -12,14 +12,15 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.setup_costs import setup_costs
 from groundstation.service.answers.shapes.setup_shapes import SetupAnswer, SetupRow
 from groundstation.service.answers.streamed_rows import Parameters
-from groundstation.service.setup.readiness import next_step, say_worst, words_of
+from groundstation.service.setup.readiness import next_step, say_hold, say_worst, words_of
+from groundstation.service.setup.setup_checks import contradicted_kinds, say_contradiction
 from groundstation.service.setup.setup_items import ALONG, SetupItem, missing_names, setup_items
 from groundstation.service.setup.toe_costs import designed_course
 
 SHOWN_UNITS = {"rad": "deg", "rad/s": "deg/s", "rad/m": "deg/m"}  # what people read in place of a unit
 LEFT_OUT = (
-    "random noise of the readings, and blunders that are not found. A slip in telling north, the stick-up or a "
-    "length is in no reading: take a second bearing, set the bit at the collar's edge, tape the tubes"
+    "random noise of the readings, and blunders that are not found. A slip in telling north or the stick-up is in no "
+    "reading, and is shown by a check alone; one in a length by the depth at the make-ups, or by a tape"
 )
 
 
@@ -30,12 +31,17 @@ def answer_setup(k: RigModel, _p: Parameters) -> SetupAnswer:
     is_surveyed = len(trajectory) > 1
     course = trajectory if is_surveyed else designed_course(k.config.design, k.config.tube_length)
     costs = setup_costs(k, items, course)
-    missing = missing_names(items)
+    missing, unchecked = missing_names(items), [item.name for item in items if item.is_unchecked]
+    contradicted = [say_contradiction(k.setup, kind) for kind in contradicted_kinds(k.setup)]
+    hold = say_hold(missing, unchecked, contradicted)
     # a column is judged across its axis: what is wrong of the depth comes after all else
     ordered = sorted(items, key=lambda item: (not item.is_missing, item.kind in ALONG, -costs[item.name]))
     return SetupAnswer(
-        ready=not missing,
+        ready=not hold,
         missing=missing,
+        unchecked=unchecked,
+        hold=hold,
+        contradicted=contradicted,
         todo=next_step(items, costs),
         worst=max(items, key=lambda item: (item.kind not in ALONG, costs[item.name])).name,
         costs_most=say_worst(items, costs),
@@ -66,5 +72,7 @@ def setup_row(item: SetupItem, costs: Mapping[str, float], now: float) -> SetupR
         age_s=None if not item.utc else max(now - datetime.datetime.fromisoformat(item.utc).timestamp(), 0.0),
         times_told=item.times_told,
         toe_cm=float(f"{100.0 * costs[item.name]:.3g}"),
+        check=item.check,
+        least_slip=None if item.least_slip is None else float(f"{scale * item.least_slip:.6g}"),
         way="along" if item.kind in ALONG else "across",
     )

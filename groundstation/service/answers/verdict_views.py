@@ -58,6 +58,7 @@ def answer_verdict(k: RigModel, _p: Parameters) -> Verdict:
         bit_md_m=known.bit,
         target_m=known.target,
         what=found.what or None,
+        unfound_cm=round(CM * known.unfound, 2),
         off=None if found.about is None else off_target_view(found.about, found.end),
         steer=way,
     )

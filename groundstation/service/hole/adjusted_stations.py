@@ -12,6 +12,7 @@ import numpy.typing as npt
 from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.hole_adjustment import directions_of
 from groundstation.service.hole.movement import Moved, moved_stations
+from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.fusion.fusion import Weighting
@@ -33,19 +34,38 @@ class AdjustedStations:
     collar : direction there
     directions : by depth (m), from the top down
     moved : where the hole moved
-    turned_back : depths (m) of stations whose surveys point back against those of the one above
     found : the adjustment; None where the surveys have no solution in common
+    told : direction at the collar as it was told
+    below : stations below it, from the top down
+    stops : theirs
     """
 
     collar: Direction
     directions: dict[float, Direction] = field(default_factory=dict)
     moved: list[Moved] = field(default_factory=list)
-    turned_back: list[float] = field(default_factory=list)
     found: Adjusted | None = None
+    told: Direction | None = None
+    below: Sequence[SurveyStation] = ()
+    stops: ResolvedStops | None = None
+
+    def turned_back(self) -> list[float]:
+        """Depths (m) of stations whose surveys point back against those of the one above."""
+        grown = [station for station in self.below if station.lacks_newest]
+        if grown and self.stops is not None:
+            SurveyStation.fuse_together(grown, self.stops)
+        above = self.collar if self.told is None else self.told
+        tangents = tangents_of([above, *map(fused_alone, self.below)])
+        back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
+        return [self.below[place].md for place in back.tolist()]
 
 
 def adjusted_stations(
-    examined: ExaminedHole | None, below: Sequence[SurveyStation], told: Direction, shared: SharedErrors, north: float
+    examined: ExaminedHole | None,
+    below: Sequence[SurveyStation],
+    told: Direction,
+    shared: SharedErrors,
+    north: float,
+    stops: ResolvedStops,
 ) -> AdjustedStations:
     """Stations of an adjusted hole; without a solution each stands for what its own surveys say.
 
@@ -54,16 +74,20 @@ def adjusted_stations(
     below : stations below the collar, from the top down
     told : direction at the collar
     north : rad, standard deviation of the encoder's zero
+    stops : of the stations
     """
-    alone = [one.fused(Weighting.BAYES) for one in below]
-    tangents = tangents_of([told, *alone])
-    back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
-    turned_back, mds = [below[place].md for place in back.tolist()], [one.md for one in below]
+    mds = [one.md for one in below]
     if examined is None:
-        return AdjustedStations(told, dict(zip(mds, alone, strict=True)), [], turned_back)
-    collar, *found = directions_of(examined.adjusted, shared, north)
+        alone = dict(zip(mds, map(fused_alone, below), strict=True))
+        return AdjustedStations(told, alone, told=told, below=below, stops=stops)
+    collar, *found = directions_of(examined.examination, shared, north)
     moved = moved_stations(examined, below)
-    return AdjustedStations(collar, dict(zip(mds, found, strict=True)), moved, turned_back, examined.adjusted)
+    return AdjustedStations(collar, dict(zip(mds, found, strict=True)), moved, examined.adjusted, told, below, stops)
+
+
+def fused_alone(station: SurveyStation) -> Direction:
+    """What the surveys of a station say by themselves."""
+    return station.fused(Weighting.BAYES)
 
 
 def learnt_wander(found: Adjusted, curvature_length: float) -> tuple[LegWander, Array]:

@@ -70,7 +70,7 @@ class Search:
         seen = self.seen
         try:
             found = examine_hole(seen.looks, seen.string, seen.path, seen.run, start=seen.start)
-            self.is_unexplained = is_suspicious(found.adjusted, seen.run)
+            self.is_unexplained = is_suspicious(found.explained, seen.run)
             self.found = found
         except (np.linalg.LinAlgError, ArithmeticError):
             self.found = None
@@ -128,10 +128,12 @@ class BlunderSearch:
         self._last = done
         return done.number, ExaminedHole(done.found, done.seen.run, done.seen.tubes, len(done.seen.looks))
 
-    def wait(self) -> None:
-        """Wait until the search that runs has ended."""
-        if self._running is not None:
-            self._running.running.join()
+    def wait(self) -> bool:
+        """Wait until the search that runs has ended; whether one ran."""
+        if self._running is None:
+            return False
+        self._running.running.join()
+        return True
 
 
 def goes_on(before: LookedAt, now: LookedAt) -> bool:

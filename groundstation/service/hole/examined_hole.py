@@ -13,13 +13,15 @@ from groundstation.survey.adjustment.blunder_cost import BlunderCost, cost_blund
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunder_words import say_blunder
 from groundstation.survey.adjustment.blunders import Blunder, Examination, chance_of_one
-from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, prior_shares, toe_budget
+from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, toe_budget
 from groundstation.survey.adjustment.hypotheses import Hypothesis
+from groundstation.survey.adjustment.last_look import LastLook, look_alone
 from groundstation.survey.adjustment.least_found import LARGEST, possible_mistakes
 from groundstation.survey.adjustment.next_stop import NextStop, plan_stop
+from groundstation.survey.adjustment.position_shares import position_shares
 from groundstation.survey.adjustment.reliability import Reliability, measure_reliability
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
-from groundstation.survey.adjustment.toe_weights import position_weights, toe_weights
+from groundstation.survey.adjustment.toe_weights import toe_weights
 from groundstation.survey.fusion.shared import KINDS
 
 Array = npt.NDArray[np.float64]
@@ -93,7 +95,14 @@ class ExaminedHole:
     @cached_property
     def shares(self) -> list[ErrorShare]:
         """Of what the variance at the toe is made."""
-        return toe_budget(self.adjusted, self.run.causes)
+        return [*toe_budget(self.adjusted, self.run.causes), *self._suspected(toe_weights(self.adjusted))]
+
+    def _suspected(self, weights: Array) -> list[ErrorShare]:
+        """Share of a suspicion in the variance of functionals (s + 1, 2, r) of the directions."""
+        if self.examination.supposed is None:
+            return []
+        moved = np.einsum("ka,kar->r", self.examination.suspected, weights)
+        return [ErrorShare(ShareSource.BLUNDER, -1, moved**2)]
 
     def share_name(self, share: ErrorShare) -> tuple[str, str]:
         """Source of a share, and the tube or joint that it is of."""
@@ -107,12 +116,12 @@ class ExaminedHole:
     def position_variances(self) -> dict[str, Array]:
         """Variances (s + 1, 3), m^2, of collar and stations to north, east and down by what looks have in common."""
         found: dict[str, Array] = {}
-        for share in prior_shares(self.adjusted, position_weights(self.adjusted), self.run.causes):
+        for share in position_shares(self.adjusted, self.run.causes):
             name = SOURCE_NAMES.get(share.source)
             if share.source is ShareSource.TURN:
                 name = KINDS.get(self.share_name(share)[0], "joints")
             if name is not None:
-                found[name] = found.get(name, 0.0) + np.maximum(share.variances, 0.0).reshape(-1, 3)
+                found[name] = found.get(name, 0.0) + np.maximum(share.variances, 0.0)
         return found
 
     @cached_property
@@ -125,6 +134,11 @@ class ExaminedHole:
     def costs(self) -> list[BlunderCost | None]:
         """What each blunder costs at the toe."""
         return cost_blunders(self.examination)
+
+    @cached_property
+    def last_look(self) -> LastLook | None:
+        """What stands on the lowest tube's last look alone; None where another has read the last station too."""
+        return look_alone(self.adjusted, self.run, chance_of_one(self.adjusted.looks, self.run))
 
     @cached_property
     def reliabilities(self) -> list[Reliability]:

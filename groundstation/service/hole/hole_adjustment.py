@@ -1,8 +1,7 @@
 """The adjustment of the hole that is being drilled, from its resolved stops. No I/O.
 
 What it comes to depends on the stops alone and not on the order in which they came or on when it was asked for: the
-same hole comes out of a rig of processes, of one process and of a restart, bit for bit. An adjustment of many looks
-therefore begins where one of all looks up to an earlier stop of the string ends, always the same one.
+same hole comes out of a rig of processes, of one process and of a restart, bit for bit.
 """
 
 from __future__ import annotations
@@ -14,14 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.config import GroundConfig
+from groundstation.service.hole.beginnings import Beginnings
 from groundstation.service.hole.blunder_search import BlunderSearch, LookedAt, RunApart
 from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import SAME_STOP
+from groundstation.service.hole.hung_chains import HungChains
 from groundstation.service.hole.resolved_stops import ResolvedStops, Rows
-from groundstation.service.hole.string_prior import Hanging, causes_of_turns, prior_of_string
-from groundstation.survey.adjustment.adjust import adjust_hole
-from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.looks import OF_TUBE, TURN, Looks, PathPrior, StartingPoint, StringPrior
+from groundstation.service.hole.string_prior import Hanging, prior_of_string
+from groundstation.survey.adjustment.blunders import Examination
+from groundstation.survey.adjustment.looks import OF_TUBE, Looks, PathPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Direction
@@ -32,10 +32,10 @@ from groundstation.survey.fusion.trust_level import Trust
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
-MANY = 1500  # looks, from which on an adjustment begins where an earlier one ended
-STOPS_KEPT = 16  # stops of the string between such beginnings
 OWN_SHARE = 0.2  # of a tube's noise that is taken from the stop itself: the variance of 32 readings is not exact
-FURTHER = 2 + 30  # columns of gravity, of north, and of what is wrong: two explanations of five blunders
+FURTHER = (
+    3 + 30
+)  # columns of gravity, of north, of a suspicion, and of what is wrong: two explanations of five blunders
 LOUD = 2.5  # times a tube's noise, from which on a stop is one at which it was shaken
 
 
@@ -51,8 +51,10 @@ class HoleAdjustment:
     def __init__(self, config: GroundConfig, shared: SharedErrors) -> None:
         self._config, self._shared = config, shared
         self._search: BlunderSearch | None = None
-        self._kept: tuple[bytes, StartingPoint] | None = None  # where an earlier adjustment ended, and of what looks
         self._hanging, self._met = Hanging(), set[int]()  # chains of which there was a stop
+        mount_var = math.radians(config.mount_std_deg) ** 2
+        self._chains = HungChains(shared, mount_var)
+        self._beginnings = Beginnings(self._looked_at, lambda: HungChains(shared, mount_var))
 
     def search_apart(self, run_apart: RunApart) -> None:
         """From now on look for what is wrong beside everything else."""
@@ -61,6 +63,10 @@ class HoleAdjustment:
     def take_found(self) -> tuple[int, ExaminedHole] | None:
         """What a search of its own came to since the last call, with the number of its newest survey."""
         return None if self._search is None else self._search.take_found()
+
+    def wait_for_search(self) -> bool:
+        """Wait until the search that runs has ended; whether one ran."""
+        return self._search is not None and self._search.wait()
 
     def make_room(self, chain: int) -> None:
         """Have the columns that a chain may need, in the order in which stops come and not in that of questions."""
@@ -91,20 +97,18 @@ class HoleAdjustment:
             return None
         path = self.path_of(mds, collar)
         forces = stops.mean_forces(rows)
-        seen = self._looked_at(table[rows], forces, station_of_row[rows], path)
-        seen = replace(seen, start=self._start(table[rows], seen))
+        seen = self._looked_at(table[rows], forces, station_of_row[rows], path, self._chains)
+        seen = replace(seen, start=self._beginnings.start_of(rows, table[rows], seen))
         return seen.examine() if self._search is None else self._search.examine(number, seen)
 
-    def _looked_at(self, seen: Rows, forces: Array, station: Places, path: PathPrior) -> LookedAt:
+    def _looked_at(self, seen: Rows, forces: Array, station: Places, path: PathPrior, chains: HungChains) -> LookedAt:
         """Looks of rows of the table in the order of time, with their mean forces, at their stations along a path."""
         numbers, which = number_values(seen["chain"])
-        chains, hanging = [self._shared.chain(number) for number in numbers], Hanging()
-        hung = np.array([hanging.add_chain(chain) for chain in chains], np.intp)[which]
+        hung = chains.hung(numbers)[which]
         systematic = seen["systematic_var"]
-        least = np.full(len(chains), math.inf)
+        least = np.full(len(numbers), math.inf)
         np.minimum.at(least, which, systematic)
-        mount_var = math.radians(self._config.mount_std_deg) ** 2
-        causes = causes_of_turns(hanging, chains, least.tolist(), mount_var)
+        causes = chains.causes(least)
         tube_of, make_up = np.ascontiguousarray(hung[:, 0]), np.ascontiguousarray(hung[:, 1])
         # what a node doubts beyond its mount and joints, as after a slip, is of that look
         unknown = UNKNOWN_YAW_VAR * (seen["trust"] == Trust.UNKNOWN_YAW) + (systematic - least[which])
@@ -114,8 +118,8 @@ class HoleAdjustment:
         first = np.searchsorted(stop, np.arange(stop[-1] + 1))
         deepest = np.maximum.reduceat(path.md[station], first)
         run = RunOfStops(deepest, seen["at"][first], path.md, causes)
-        string = prior_of_string(self._config, len(hanging.tubes), causes)
-        return LookedAt(looks, string, path, run, tuple(str(tube) for _, tube in hanging.tubes))
+        tubes = tuple(str(tube) for _, tube in chains.hanging.tubes)
+        return LookedAt(looks, prior_of_string(self._config, len(tubes), causes), path, run, tubes)
 
     def path_of(self, mds: Array, collar: Direction) -> PathPrior:
         """What is known of the path before."""
@@ -129,55 +133,14 @@ class HoleAdjustment:
             self._config.curvature_length,
         )
 
-    def _start(self, rows: Rows, seen: LookedAt) -> StartingPoint | None:
-        """Where the adjustment of many looks begins; None for that of a few, which begins with the looks alone."""
-        looks, path = seen.looks, seen.path
-        if len(looks) < MANY:
-            return None
-        earlier = np.flatnonzero(looks.stop < int(looks.stop[-1]) // STOPS_KEPT * STOPS_KEPT)
-        if not len(earlier):
-            return None  # many tubes, and few stops yet
-        used, station = np.unique(looks.station[earlier], return_inverse=True)
-        above = replace(path, md=path.md[np.concatenate([[0], used])])
-        made_of = rows[earlier].tobytes() + looks.force[earlier].tobytes() + above.md.tobytes()
-        if self._kept is None or self._kept[0] != made_of:
-            part = self._looked_at(rows[earlier], looks.force[earlier], station.astype(np.intp) + 1, above)
-            self._kept = made_of, adjust_hole(part.looks, part.string, above).now
-        return grown_start(self._kept[1], used, len(path.md), seen.string)
-
-
-def grown_start(start: StartingPoint, used: Places, count: int, string: StringPrior) -> StartingPoint:
-    """Where to begin with more stations and tubes: new stations go on as those above, new tubes as they are known.
-
-    Parameters
-    ----------
-    used : places of the stations that were adjusted among ``count``, the collar included
-    """
-    tubes = np.zeros((string.count, OF_TUBE))
-    tubes[:, TURN], make_ups = string.turn[: string.count], string.turn[string.count :].copy()
-    tubes[: len(start.tubes)], make_ups[: len(start.make_ups)] = start.tubes, start.make_ups
-    known = np.concatenate([[0], used])
-    nearest = np.searchsorted(known, np.arange(count), side="right") - 1
-    curvatures = np.zeros((count, 2))
-    curvatures[known] = start.curvatures
-    legs = np.full(count - 1, start.curvature_var)
-    legs[known[1:] - 1] = start.leg_vars
-    return replace(
-        start,
-        tangents=start.tangents[nearest],
-        curvatures=curvatures,
-        tubes=tubes,
-        make_ups=make_ups,
-        leg_vars=legs,
-        is_learnt=True,
-    )
-
 
 def number_values(values: npt.NDArray[np.uint32]) -> tuple[list[int], Places]:
     """Different values in the order of their coming, and the place (n,) of each among them."""
-    different = dict.fromkeys(values.tolist())
-    place = {value: number for number, value in enumerate(different)}
-    return list(different), np.array([place[value] for value in values.tolist()], np.intp)
+    different, first, which = np.unique(values, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    place = np.empty(len(order), np.intp)
+    place[order] = np.arange(len(order))
+    return different[order].tolist(), place[which]
 
 
 def stop_numbers(at: Array) -> Places:
@@ -193,15 +156,20 @@ def noise_of(seen: Rows, tube_of: Places) -> Array:
     return np.where(own > LOUD * usual, own, OWN_SHARE * own + (1.0 - OWN_SHARE) * usual)
 
 
-def directions_of(adjusted: Adjusted, shared: SharedErrors, north_std: float) -> list[SphereDirection]:
+def directions_of(examination: Examination, shared: SharedErrors, north_std: float) -> list[SphereDirection]:
     """Directions of the collar and the stations below it, from the top down.
 
     The encoder's zero against north (rad) turns them all about the vertical and is in no look: it is one more column.
+    So is what is suspected: by how much it would move them, as one standard deviation.
     """
+    adjusted = examination.adjusted
     bases, tangents = adjusted.bases, adjusted.now.tangents
     own = np.swapaxes(bases, 1, 2) @ adjusted.own_covs[:, :2, :2] @ bases
     turned = north_std * np.stack([-tangents[:, 1], tangents[:, 0], np.zeros(len(tangents))], axis=1)
-    columns = np.concatenate([np.swapaxes(bases, 1, 2) @ adjusted.columns[:, :2], turned[:, :, None]], axis=2)
+    of_looks = adjusted.direction_columns
+    if examination.supposed is not None:
+        of_looks = np.concatenate([of_looks, examination.suspected[:, :, None]], axis=2)
+    columns = np.concatenate([np.swapaxes(bases, 1, 2) @ of_looks, turned[:, :, None]], axis=2)
     places = shared.adjusted_places(columns.shape[2])
     width = shared.count
     found = []

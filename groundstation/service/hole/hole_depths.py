@@ -11,6 +11,7 @@ from groundstation.service.hole.station import SurveyStation
 from groundstation.service.hole.told_depths import depths_at_make_ups
 from groundstation.service.setup.setup_book import SetupBook
 from groundstation.service.setup.setup_priors import depth_errors, length_stds
+from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.well.depth_errors import DepthErrors, StationDepth, mean_depth
 from groundstation.survey.well.make_up_depths import learnt_reading_std, misfit_of_depths
@@ -30,6 +31,7 @@ class HoleDepths:
         self._config, self._setup, self._shared, self._stops = config, setup, shared, stops
         self._told = depth_errors(config, setup)
         self._misfit: tuple[int, float, str] = (0, 0.0, "")  # by version and since when
+        self._columns: dict[float, tuple[tuple[int, ...], Packed]] = {}  # by depth (m) of a station, and of what
 
     def misfit(self, version: int, since: float) -> str:
         """Why the depths of surveys after a rig time (s) do not fit the tubes, in words, or nothing.
@@ -56,8 +58,13 @@ class HoleDepths:
         told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()} if stds else {}
         found, places_of = {}, self._stops.depth_places.__getitem__
         for one in stations:
-            places = [*map(places_of, one.stops.rows)]
-            found[one.md] = mean_depth(one.md, places, errors, self._config.tube_length, told)
+            made_of = (len(one.stops.rows), one.revised, self._setup.version)
+            known = self._columns.get(one.md)
+            if known is None or known[0] != made_of:  # what all of its readings share is as it was
+                places = [*map(places_of, one.stops.rows)]
+                columns = mean_depth(one.md, places, errors, self._config.tube_length, told).columns
+                known = self._columns[one.md] = made_of, columns
+            found[one.md] = StationDepth(known[1], errors.reading_std**2 / made_of[0])
         return found
 
     def _learnt(self) -> DepthErrors:

@@ -34,17 +34,14 @@ def _of_directions(
     drawn: Trajectory, shared: SharedErrors, examined: ExaminedHole | None, north_std: float
 ) -> dict[str, Array]:
     """Variances (n, 3), m^2, by what directions have in common."""
-    common = np.concatenate([shared.variances(columns) for columns in drawn.columns()])
-    found = dict(zip(KIND_NAMES, np.moveaxis(common, 1, 0), strict=True))
     if examined is None:
-        return found
+        common = np.concatenate([shared.variances(columns) for columns in drawn.columns()])
+        return dict(zip(KIND_NAMES, np.moveaxis(common, 1, 0), strict=True))
     turned = np.square(drawn.positions[:, 1::-1]) * north_std**2
     north = np.concatenate([turned, np.zeros((len(turned), 1))], axis=1)
-    return {"depth": found["depth"], "north": north} | examined.position_variances
+    return {"depth": drawn.shared_depth_vars, "north": north} | examined.position_variances
 
 
-def depth_variance_at_toe(drawn: Trajectory, shared: SharedErrors) -> Array:
+def depth_variance_at_toe(drawn: Trajectory) -> Array:
     """Variance (3,), m^2, of the last position by what is not known of depths."""
-    *_, columns = drawn.columns()
-    common = shared.variances(columns)[-1, KIND_NAMES.index("depth")]
-    return np.asarray(common + np.diagonal(drawn.depth_covs[-1]))
+    return np.asarray(drawn.shared_depth_vars[-1] + np.diagonal(drawn.depth_covs[-1]))

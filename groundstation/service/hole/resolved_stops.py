@@ -7,6 +7,7 @@ many stops at once (weights, departures, fused directions) is read from the tabl
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -21,6 +22,7 @@ from groundstation.survey.fusion.shared import CAUSES, Places, columns_of
 from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR, SphereDirection
 from groundstation.survey.fusion.sphere_fusion import Stack
 from groundstation.survey.fusion.trust_level import Trust
+from groundstation.survey.well.depth_errors import OF_ALL
 from telemetry.messages import NodeFlag
 
 Array = npt.NDArray[np.float64]
@@ -106,6 +108,7 @@ class ResolvedStops:
     forces : (imus, 3) of each stop as bytes, m/s^2
     places : of the columns of each stop, see ``groundstation.survey.fusion.shared``
     depth_places : of the columns of the depth of each
+    below : tubes below each in a table that grows
     """
 
     def __init__(self, count: int | None = None) -> None:
@@ -113,6 +116,8 @@ class ResolvedStops:
         self.forces: list[bytes] = [b""] * (count or 0)
         self.places: list[Places] = []
         self.depth_places: list[Places] = []
+        self.below = array("H")
+        self._means: Array = np.empty((0, AXES))  # of the forces of stops, as far as they were asked for
 
     def __len__(self) -> int:
         return len(self.forces)
@@ -137,6 +142,7 @@ class ResolvedStops:
         self.forces.append(other.forces[row])
         self.places.append(other.places[row])
         self.depth_places.append(other.depth_places[row])
+        self.below.append(len(other.depth_places[row]) - OF_ALL)
         return own
 
     def replace_stop(self, own: int, other: ResolvedStops, row: int) -> None:
@@ -146,6 +152,7 @@ class ResolvedStops:
         self.rows["replaces"][own] = replaced
         self.places[own] = other.places[row]
         self.depth_places[own] = other.depth_places[row]
+        self.below[own] = len(other.depth_places[row]) - OF_ALL
 
     def is_revised_by(self, own: int, other: ResolvedStops, row: int) -> bool:
         """Whether a stop of another table is that of a row again: of the same tube and time, and the same readings."""
@@ -158,11 +165,13 @@ class ResolvedStops:
         return self.rows[name][: len(self.forces)]
 
     def mean_forces(self, numbers: npt.NDArray[np.intp]) -> Array:
-        """Mean specific force (n, 3), m/s^2, of the IMUs of the stops in several rows."""
-        kept = [self.forces[number] for number in numbers.tolist()]
-        if len({*map(len, kept)}) == 1:
-            return np.asarray(np.frombuffer(b"".join(kept)).reshape(len(kept), -1, AXES).mean(axis=1))
-        return np.array([np.frombuffer(one).reshape(-1, AXES).mean(axis=0) for one in kept])
+        """Mean specific force (n, 3), m/s^2, of the IMUs of the stops in several rows.
+
+        That of a row is worked out once: a stop that is revised has the same readings.
+        """
+        if new := self.forces[len(self._means) :]:
+            self._means = np.concatenate([self._means, means_of(new)])
+        return np.asarray(self._means[numbers])
 
     def direction(self, row: int) -> SphereDirection:
         """Direction of the stop in a row, with its columns."""
@@ -209,6 +218,13 @@ class ResolvedStops:
             causes=planes_across(row["tangent"]).T @ row["causes"],
             places=self.places[number],
         )
+
+
+def means_of(kept: Sequence[bytes]) -> Array:
+    """Mean forces (n, 3) of stops as a table keeps them, m/s^2."""
+    if len({*map(len, kept)}) == 1:
+        return np.asarray(np.frombuffer(b"".join(kept)).reshape(len(kept), -1, AXES).mean(axis=1))
+    return np.array([np.frombuffer(one).reshape(-1, AXES).mean(axis=0) for one in kept])
 
 
 def forces_of(kept: bytes) -> list[list[float]]:

@@ -11,7 +11,7 @@ below it, and of one of the make-up, which is named after the topmost tube.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -49,20 +49,27 @@ class Hanging:
     upper: dict[Hung, Hung] = field(default_factory=dict)
     _lower: dict[Hung, Hung] = field(default_factory=dict)
     _time: int = 0
+    _known: set[tuple[int, ...]] = field(default_factory=set)  # chains that hang so by now, from their lowest tube up
 
     def add_chain(self, chain: Chain) -> tuple[int, int]:
         """Places of the tube of a chain and of its make-up."""
         tube, above = chain
         if above is None:
             return self._place(self.tubes, (self._time, tube)), self._place(self.make_ups, (self._time, -tube))
-        pairs = list(pairwise([tube, *above]))
+        if (names := (tube, *above)) not in self._known:
+            self._hang(names)
+        return self._place(self.tubes, (self._time, tube)), self._place(self.make_ups, (self._time, names[-1]))
+
+    def _hang(self, names: tuple[int, ...]) -> None:
+        """Hang tubes, from the lowest up, below each other."""
+        pairs = list(pairwise(names))
         if not all(self._fits((self._time, lower), (self._time, upper)) for lower, upper in pairs):
             self._time += 1
+            self._known.clear()
         for lower, upper in pairs:
             self.upper[self._time, lower] = self._time, upper
             self._lower[self._time, upper] = self._time, lower
-        top = above[-1] if above else tube
-        return self._place(self.tubes, (self._time, tube)), self._place(self.make_ups, (self._time, top))
+        self._known |= {names[place:] for place in range(len(names))}
 
     def _fits(self, lower: Hung, upper: Hung) -> bool:
         return self.upper.get(lower, upper) == upper and self._lower.get(upper, lower) == lower
@@ -101,8 +108,9 @@ def causes_of_turns(
     own = dict(zip(chains, systematic_vars, strict=True))
     totals = {chain: max(total - mount_var, 0.0) for chain, total in own.items()}
     joints: dict[Joint, float] = {}
-    for chain in chains:
-        joints |= joint_variances(chain, totals)
+    for chain in reversed(chains):  # a joint is known as the newest chain that has it says
+        if not all(name in joints for name in joints_of(chain)):
+            joints = joint_variances(chain, totals) | joints
     mounts = {chain[0]: min(mount_var, total) for chain, total in own.items()}
     rows = [errors_of_mount(hanging, hung) for hung in hanging.tubes] + [
         errors_of_make_up(hanging, hung) for hung in hanging.make_ups
@@ -141,6 +149,12 @@ def errors_of_make_up(hanging: Hanging, hung: Hung) -> list[tuple[Joint, float]]
     return [((time, top, DRIVE), 1.0), *(((time, lower[1], upper[1]), 1.0) for upper, lower in pairwise(below))]
 
 
+def joints_of(chain: Chain) -> Iterable[Joint]:
+    """Names of the joints above a tube, each by its lower and upper tube."""
+    tube, above = chain
+    return [(tube, DRIVE, DRIVE)] if above is None else pairwise((tube, *above, DRIVE))
+
+
 def joint_variances(chain: Chain, totals: Mapping[Chain, float]) -> dict[Joint, float]:
     """Variance (rad^2) of every joint above a tube, by its lower and upper tube.
 
@@ -152,7 +166,7 @@ def joint_variances(chain: Chain, totals: Mapping[Chain, float]) -> dict[Joint, 
     tube, above = chain
     if above is None:
         return {(tube, DRIVE, DRIVE): totals[chain]}
-    names = [(lower, upper) for lower, upper in pairwise([tube, *above, DRIVE])]
+    names = list(joints_of(chain))
     found: dict[Joint, float] = {}
     known = totals[chain]
     waiting = [names[0]]

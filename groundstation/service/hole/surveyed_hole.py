@@ -148,8 +148,16 @@ class SurveyedHole:
         self._is_behind = False
 
     def _end_stop(self) -> None:
-        """Keep what is known at the end of a stop. What is kept of one already is judged as it was judged then."""
+        """Keep what is known at the end of a stop. What is kept of one already is judged as it was judged then.
+
+        A search of its own that still runs is waited for, or what is kept would lack what it finds: a stop ends when
+        the next one begins, so it hardly ever does.
+        """
         history = self._history
+        if self._is_adjusted and not self._is_behind:
+            self.settle()
+            while self._adjustment.wait_for_search():
+                self.adopt_found()
         if not (self._is_adjusted and self._is_behind):
             history.add(self.deviations, self.projection)
         elif (kept := history.take_over(len(self._stops))) is not None:
@@ -217,7 +225,7 @@ class SurveyedHole:
         The adjustment of the hole leaves such a survey out, and what is drawn points on.
         """
         self.settle()
-        return self._stands.turned_back if self._is_adjusted else self._trajectory.turned_back
+        return self._stands.turned_back() if self._is_adjusted else self._trajectory.turned_back
 
     def direction_of(self, station: SurveyStation) -> Direction:
         """Direction of the hole at a station, the transport of the string in it."""
@@ -238,8 +246,9 @@ class SurveyedHole:
         """
         if self._examined[0] != self.version:
             below = self._below
-            place = {id(one): number for number, one in enumerate(below, 1)}
-            station_of_row = np.array([place.get(id(one), 0) for one in self._station_of], np.intp)
+            station_of_row = np.zeros(len(self._stops), np.intp)
+            for place, one in enumerate(below, 1):
+                station_of_row[one.stops.rows] = place
             mds = np.array([one.md for one in below])
             try:
                 found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar, self.newest)
@@ -288,7 +297,7 @@ class SurveyedHole:
     @property
     def toe_by_depth(self) -> Array:
         """Variance (3,), m^2, of the last position by what is not known of depths."""
-        return depth_variance_at_toe(self.trajectory, self._shared)
+        return depth_variance_at_toe(self.trajectory)
 
     def place_of(self, station: SurveyStation) -> int:
         """Place of a station in the trajectory; that of the collar for one at its depth."""
@@ -317,7 +326,8 @@ class SurveyedHole:
         self._touched, below = {}, self._below
         for station in self._stations:
             station.forget_view()
-        self._stands = adjusted_stations(self.examined, below, self._collar, self._shared, north_std(self._setup))
+        north = north_std(self._setup)
+        self._stands = adjusted_stations(self.examined, below, self._collar, self._shared, north, self._stops)
         self._trajectory = self._drawn_from(self._stands.collar)
         if self._stands.found is not None:
             self._trajectory.bend_as(*learnt_wander(self._stands.found, self._config.curvature_length))

@@ -9,7 +9,6 @@ from groundstation.config import GroundConfig
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.setup.setup_book import SetupBook
 from groundstation.survey.fusion.shared import SharedErrors
-from groundstation.survey.well.depth_errors import OF_ALL
 from groundstation.survey.well.make_up_depths import MakeUpDepths, make_up_depths
 
 Array = npt.NDArray[np.float64]
@@ -26,7 +25,7 @@ def depths_at_make_ups(
     since : s, rig time from which on stops count
     """
     table = stops.rows[: len(stops)]
-    is_at_bit = np.array([len(places) == OF_ALL for places in stops.depth_places[: len(stops)]], bool)
+    is_at_bit = np.array(stops.below) == 0
     rows = np.flatnonzero(is_at_bit & (table["hops"] > 0) & (table["md"] > 0.0) & (table["at"] > since))
     if not len(rows):
         return NOTHING

@@ -200,6 +200,14 @@ class GroundProcess(Process):
         due = self._uploads.next_due() if self._uploads is not None else math.inf
         return min(super().next_wake(now), due)
 
+    def bar(self, trouble: str, now: float) -> None:
+        """Tell the crew why nothing is taken in from now on, or by an empty text that it is again; nothing is kept."""
+        self.operator.barred = trouble
+        self.model.rig_alarms.hold("lease", GROUND_STATION, trouble)
+        self.model.crew_alarms.update(self._conditions(), Times(now, self._string.time.rig_now, time.time()))
+        self.model.revisions.on_event()
+        self._publish(["alarms", "status", "verdict"])
+
     def close(self) -> None:
         """Close the database."""
         self.store.close()

@@ -16,7 +16,7 @@ from functools import partial
 from typing import Any
 
 from groundstation.config import GroundConfig
-from groundstation.errors import ConfigurationError, SelectorError
+from groundstation.errors import ConfigurationError, LeaseError, SelectorError
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.paths import find_path
 from groundstation.service.disk.ground_store import Store
@@ -91,6 +91,7 @@ class OperatorAccess:
         self.follow_setup: Callable[[], int] = lambda: 0  # called when the setup is told anew; how many surveys follow
         self.wake: Callable[[], None] = lambda: None  # called when something is to be sent
         self.ended: Callable[[int], None] = lambda _number: None  # called with an order that is not to be sent any more
+        self.barred = ""  # why no order is taken
         self.accepted: Callable[[str, Mapping[str, str], str], None] = lambda _name, _parameters, _by: (
             None
         )  # and obeyed
@@ -125,7 +126,11 @@ class OperatorAccess:
             When the command, its tube or a parameter cannot be; nothing is sent.
         CalibrationError, ConfigurationError, StoreError
             When the ground station cannot obey; nothing is sent.
+        LeaseError
+            When it may not be the ground station of the rig any more.
         """
+        if self.barred:
+            raise LeaseError(self.barred)
         check_name(by)
         try:
             spec = find_command(name, parameters.get("action", ""))

@@ -27,6 +27,12 @@ ORDERS = {
 }
 
 
+CHECK_ORDERS = {
+    SetupKind.NORTH: "check north: cmd/north?action=check;angle_deg=..;sigma_deg=..",
+    SetupKind.STICK_UP: "check the stick-up: cmd/stick_up?action=check;height_m=..;sigma_m=..",
+}
+
+
 def told_briefly(names: Sequence[str]) -> str:
     """Names of what is missing as a crew says them: ``north, joints 4-3, 3-2 and 2 more``."""
     joints = [name.partition(".")[2] for name in names if name.startswith(f"{SetupKind.JOINT}.")]
@@ -35,6 +41,12 @@ def told_briefly(names: Sequence[str]) -> str:
         return ", ".join(others)
     more = f" and {len(joints) - MOST_NAMED} more" if len(joints) > MOST_NAMED else ""
     return ", ".join([*others, f"joint{'s' if len(joints) > 1 else ''} {', '.join(joints[:MOST_NAMED])}{more}"])
+
+
+def say_hold(missing: Sequence[str], unchecked: Sequence[str], contradicted: Sequence[str]) -> str:
+    """Why a rig is not ready to drill: what is not told, not checked, or told one way and checked another."""
+    told = [f"not told: {', '.join(missing)}"] * bool(missing)
+    return "; ".join([*told, *[f"not checked: {', '.join(unchecked)}"] * bool(unchecked), *contradicted])
 
 
 def words_of(item: SetupItem) -> str:
@@ -55,12 +67,14 @@ def say_worst(items: Sequence[SetupItem], costs: Mapping[str, float]) -> str:
 
 
 def next_step(items: Sequence[SetupItem], costs: Mapping[str, float]) -> str:
-    """The one thing to do next: what is missing first, then what costs most at the toe and can be told or measured.
+    """The one thing to do next: tell what is missing, check what was told once, then what costs most at the toe.
 
     What moves the toe across the hole comes before what moves it along.
     """
     if missing := missing_names(list(items)):
         return order_of(next(item for item in items if item.name == missing[0]))
+    if unchecked := [item for item in items if item.is_unchecked]:
+        return CHECK_ORDERS[unchecked[0].kind]
     guessed = [item for item in items if not item.is_told and item.kind in ORDERS]
     worth = [item for item in guessed if costs.get(item.name, 0.0) >= WORTH_TELLING]
     if not worth:

@@ -12,6 +12,7 @@ from itertools import pairwise
 
 from groundstation.config import GroundConfig
 from groundstation.service.setup.told_value import (
+    CHECK,
     CONFIGURATION,
     DRIVE,
     SetupKind,
@@ -58,6 +59,10 @@ class SetupBook:
     def standing(self, kind: SetupKind, subject: object = "") -> ToldValue | None:
         """What stands of an item; None where it was not told, or that was taken back."""
         return self._standing.get(item_name(kind, subject))
+
+    def check_of(self, kind: SetupKind) -> ToldValue | None:
+        """The second reading that checks an item; None where there is none."""
+        return self._standing.get(item_name(kind, CHECK))
 
     def told_before(self, name: str) -> int:
         """How often an item was told by orders, also what does not stand any more."""
@@ -134,8 +139,8 @@ def pair_of(subject: str) -> Pair:
 def told_by_config(config: GroundConfig) -> Iterable[ToldValue]:
     """What the configuration of a ground station tells."""
 
-    def told(kind: SetupKind, sigma: float, *values: float, subject: str = "") -> ToldValue:
-        return ToldValue(0, kind, subject, values, sigma, CONFIGURATION, "")
+    def told(kind: SetupKind, sigma: float, *values: float, subject: str = "", checks: bool = False) -> ToldValue:
+        return ToldValue(0, kind, subject, values, sigma, CONFIGURATION, "", checks=checks)
 
     rad = math.radians
     if config.north_std_deg is not None:
@@ -145,5 +150,9 @@ def told_by_config(config: GroundConfig) -> Iterable[ToldValue]:
         yield told(SetupKind.COLLAR, rad(config.collar_std_deg), *lean)
     if config.stick_up_std_m is not None:
         yield told(SetupKind.STICK_UP, config.stick_up_std_m, config.stick_up_m)
+    if config.north_check_deg is not None and config.north_check_std_deg is not None:
+        yield told(SetupKind.NORTH, rad(config.north_check_std_deg), rad(config.north_check_deg), checks=True)
+    if config.stick_up_check_m is not None and config.stick_up_check_std_m is not None:
+        yield told(SetupKind.STICK_UP, config.stick_up_check_std_m, config.stick_up_check_m, checks=True)
     for pair, angle_deg, std_deg in config.joints:
         yield told(SetupKind.JOINT, rad(std_deg), rad(angle_deg), subject=pair)

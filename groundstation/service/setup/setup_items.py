@@ -9,10 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from groundstation.config import SENSOR_BIAS_DEG, GroundConfig
 from groundstation.service.setup.setup_book import Pair, SetupBook
+from groundstation.service.setup.setup_checks import (
+    CHECKED,
+    STICK_UP_STD,
+    counted_std,
+    is_unchecked,
+    least_slip,
+    say_check,
+)
 from groundstation.service.setup.told_value import (
     CONFIGURATION,
     DRIVE,
@@ -29,7 +37,6 @@ DEG = math.radians(1.0)
 COLLAR_STD = 1.0 * DEG  # each way, of a rig that is set up by eye and level
 MOUNT_TILT_STD = 0.5 * DEG  # of an IMU as it is mounted in its tube, until an alignment has found it
 JOINT_STD = 0.05 * DEG  # of a scribe mark that a node was told; the ground station does not hear its own
-STICK_UP_STD = 0.1  # m, until it is told
 GRAVITY_STD = 2e-3  # m/s^2, of what is entered for the site
 ALONG = (SetupKind.LENGTH, SetupKind.STICK_UP, SetupKind.DEPTH_SCALE)  # errors of the depth
 BARE = "bare sensor"
@@ -50,6 +57,9 @@ class SetupItem:
     by, utc : who told it and when; empty where it was not told, or not by an order
     is_needed : without it no azimuth is known, so that it is missing where it was not told
     times_told : by orders
+    check : what checks it, in words; empty of what readings show, or what was not told
+    is_unchecked : it was told once, no reading shows a slip, and nothing checks it
+    least_slip : smallest slip that its check shows; None where nothing does, or where readings do
     """
 
     kind: SetupKind
@@ -63,6 +73,9 @@ class SetupItem:
     utc: str = ""
     is_needed: bool = False
     times_told: int = 0
+    check: str = ""
+    is_unchecked: bool = False
+    least_slip: float | None = None
 
     @property
     def name(self) -> str:
@@ -204,7 +217,12 @@ def _told_item(told: ToldValue, unit: str, book: SetupBook, *, is_needed: bool =
     detail = CONFIGURATION if told.number == 0 else f"by {told.by}"
     if told.used is not None:
         detail += f", its node computes by {math.degrees(told.used):g} deg"
-    return SetupItem(
-        told.kind, told.subject, told.values, told.sigma, unit, SetupSource.TOLD, detail, told.by, told.utc, is_needed,
-        book.told_before(told.name),
+    found = SetupItem(
+        told.kind, told.subject, told.values, counted_std(book, told), unit, SetupSource.TOLD, detail, told.by,
+        told.utc, is_needed, book.told_before(told.name),
     )  # fmt: skip
+    if told.kind not in CHECKED:
+        return found
+    check = book.check_of(told.kind)
+    slip = None if check is None else least_slip(told, check)
+    return replace(found, check=say_check(book, told.kind), is_unchecked=is_unchecked(book, told.kind), least_slip=slip)

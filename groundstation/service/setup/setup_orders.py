@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
 from groundstation.errors import SelectorError
 from groundstation.service.setup.setup_book import Pair, SetupBook
-from groundstation.service.setup.told_value import DRIVE, SetupKind, ToldValue, joint_subject
+from groundstation.service.setup.setup_checks import say_contradiction
+from groundstation.service.setup.told_value import DRIVE, SetupKind, ToldValue, joint_subject, shown_value
 from telemetry.application.commands import CommandSpec
 
 VALUES: Final = {  # arguments that hold what an order tells
@@ -86,6 +86,8 @@ class SetupOrders:
         """
         if order.spec.name == "setup":
             return self._enter(self._taken_back(order))
+        if order.spec.action == "check":
+            return self._check(order)
         kind, told = SetupKind(order.spec.name), order.arguments
         subject, values = self._subject_of(kind, order), tuple(told[name] for name in VALUES[kind])
         number = self._book.next_number()
@@ -97,6 +99,17 @@ class SetupOrders:
         doubt = self._check_collar() if kind is SetupKind.COLLAR else ""
         return f"{detail}; {doubt}" if doubt else detail
 
+    def _check(self, order: SetupOrder) -> str:
+        """Enter a second reading beside what was told."""
+        kind, told = SetupKind(order.spec.name), order.arguments
+        if self._book.standing(kind) is None:
+            raise SelectorError(f"{kind.value}: expected it to be told before it is checked: action=tell")
+        values, number = tuple(told[name] for name in VALUES[kind]), self._book.next_number()
+        detail = self._enter(ToldValue(number, kind, "", values, told["sigma"], order.by, order.utc, checks=True))
+        if wrong := say_contradiction(self._book, kind):
+            return f"{detail}; {wrong}; tell it again, or take the check back"
+        return f"{detail}; it bears out what was told"
+
     def _subject_of(self, kind: SetupKind, order: SetupOrder) -> str:
         if kind is SetupKind.JOINT:
             return joint_subject(*self._checked_joint(order))
@@ -106,7 +119,8 @@ class SetupOrders:
         self._store.keep_told(entry)
         self._book.add([entry])
         surveys = self._follow()
-        done = f"{entry.name} is taken back" if entry.takes_back else f"{entry.name} is {shown_value(entry)}"
+        name = f"the check of {entry.kind.value}" if entry.checks else entry.name
+        done = f"{name} is taken back" if entry.takes_back else f"{name} is {shown_value(entry)}"
         return f"{done}; {surveys} surveys were adjusted to it" if surveys else done
 
     def _taken_back(self, order: SetupOrder) -> ToldValue:
@@ -114,8 +128,9 @@ class SetupOrders:
         if newest is None:
             raise SelectorError("setup: expected something that an order told, there is nothing to take back")
         return ToldValue(
-            number, newest.kind, newest.subject, (), newest.sigma, order.by, order.utc, takes_back=newest.number
-        )
+            number, newest.kind, newest.subject, (), newest.sigma, order.by, order.utc, takes_back=newest.number,
+            checks=newest.checks,
+        )  # fmt: skip
 
     def _checked_joint(self, order: SetupOrder) -> Pair:
         """The joint at the upper end of the tube that an order names."""
@@ -137,11 +152,3 @@ class SetupOrders:
         if not knows and used is not None:
             raise SelectorError(f"joint {subject}: the node of tube {teller} was told no angle; expected no used_deg")
         return upper, lower
-
-
-def shown_value(told: ToldValue) -> str:
-    """A value with its standard deviation and unit, for people."""
-    is_length = told.kind in (SetupKind.LENGTH, SetupKind.STICK_UP)
-    scale, unit = (1.0, "m") if is_length else (math.degrees(1.0), "deg")
-    values = " to ".join(f"{scale * value:g}" for value in told.values)
-    return f"{values} ± {scale * told.sigma:g} {unit}"

@@ -10,6 +10,7 @@ import numpy as np
 
 from groundstation.config import GroundConfig
 from groundstation.service.setup.setup_book import SetupBook
+from groundstation.service.setup.setup_checks import counted_std
 from groundstation.service.setup.setup_items import COLLAR_STD, SetupItem, untold_stick_up_std
 from groundstation.service.setup.told_value import SetupKind
 from groundstation.survey.fusion.resolve import Direction, known_direction
@@ -51,7 +52,7 @@ def setup_priors(items: Iterable[SetupItem], version: int = 0) -> SetupPriors:
 def north_std(book: SetupBook) -> float:
     """Standard deviation (rad) of the encoder's zero against north; of one that was not told any azimuth may be."""
     told = book.standing(SetupKind.NORTH)
-    return UNKNOWN_YAW_STD if told is None else told.sigma
+    return UNKNOWN_YAW_STD if told is None else counted_std(book, told)
 
 
 def collar_direction(config: GroundConfig, book: SetupBook) -> Direction:
@@ -66,7 +67,7 @@ def collar_direction(config: GroundConfig, book: SetupBook) -> Direction:
 def depth_errors(config: GroundConfig, book: SetupBook) -> DepthErrors:
     """Errors of measured depths but for those of lengths that were told; of a stick-up wide where none was."""
     usual, told = config.depth_errors, book.standing(SetupKind.STICK_UP)
-    return replace(usual, offset_std=untold_stick_up_std(config) if told is None else told.sigma)
+    return replace(usual, offset_std=untold_stick_up_std(config) if told is None else counted_std(book, told))
 
 
 def length_stds(book: SetupBook) -> Mapping[int, float]:

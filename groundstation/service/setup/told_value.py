@@ -13,6 +13,7 @@ from groundstation.errors import GroundError
 
 CONFIGURATION = "configuration"  # tells what stands in the options of the ground station
 NO_SUBJECT: Final = re.compile("")
+CHECK = "check"  # in the place of a subject
 DRIVE = 0  # stands for the drive head among the tubes of a pair
 
 
@@ -66,6 +67,7 @@ class ToldValue:
     used : rad, angle by which the node computed; None where it was told none
     by, utc : who told it and when
     takes_back : number of the entry that does not stand any more
+    checks : it is a second reading, which checks what is told and does not take its place
     """
 
     number: int
@@ -77,11 +79,12 @@ class ToldValue:
     utc: str
     used: float | None = None
     takes_back: int = 0
+    checks: bool = False
 
     @property
     def name(self) -> str:
-        """Name of the item that it tells."""
-        return item_name(self.kind, self.subject)
+        """Name of the item that it tells, or checks: ``north`` and ``north.check``."""
+        return item_name(self.kind, CHECK if self.checks else self.subject)
 
     @property
     def correction(self) -> float:
@@ -97,6 +100,14 @@ def item_name(kind: SetupKind, subject: object = "") -> str:
 def joint_subject(upper: int, lower: int) -> str:
     """A joint by its tubes, such as ``4-3``, or ``drive-4``."""
     return f"{'drive' if upper == DRIVE else upper}-{lower}"
+
+
+def shown_value(told: ToldValue) -> str:
+    """A value with its standard deviation and unit, for people."""
+    is_length = told.kind in (SetupKind.LENGTH, SetupKind.STICK_UP)
+    scale, unit = (1.0, "m") if is_length else (math.degrees(1.0), "deg")
+    values = " to ".join(f"{scale * value:g}" for value in told.values)
+    return f"{values} ± {scale * told.sigma:g} {unit}"
 
 
 def told_to_text(told: ToldValue) -> str:

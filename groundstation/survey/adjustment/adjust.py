@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.adjustment.adjusted import Adjusted, Linearised, LinearSolution
+from groundstation.survey.adjustment.adjusted import Adjusted, Linearised
 from groundstation.survey.adjustment.curvature_size import learnt_curvature
 from groundstation.survey.adjustment.equations import (
     Equations,
@@ -25,19 +25,39 @@ from groundstation.survey.adjustment.equations import (
 )
 from groundstation.survey.adjustment.kernels.observations import add_looks, linearise_looks
 from groundstation.survey.adjustment.kernels.path_elimination import eliminate_path, substitute_path
+from groundstation.survey.adjustment.linear_solution import InCommon, LinearSolution
 from groundstation.survey.adjustment.looks import OF_TUBE, FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.play import PLAY_KNOWN_AS, faster_play, learnt_play
-from groundstation.survey.adjustment.sphere import carried_bases, step_directions
+from groundstation.survey.adjustment.sphere import carried_bases, step_about_vertical
 from groundstation.survey.adjustment.starting_point import first_start
 
 Array = npt.NDArray[np.float64]
-ITERATIONS = 12
+Truths = npt.NDArray[np.bool_]
+ITERATIONS = 12  # in which play and bends are learnt; they are left as they stand then
+FURTHER = 8  # of the unknowns alone
 SETTLED = 0.03  # standard deviations, of the last step; what is left then is some tenth of it
 NEAR = 3.0  # standard deviations, of a step from which on the play is not that of unknowns still on their way
 PLAY_SETTLED = 0.02  # of its variance
 LEGS_SETTLED = 0.2  # of the logarithm of the variance of each leg
-PART = 0.75
+POOR_YAW = 0.05  # rad, standard deviation, from which on a direction goes about the vertical rather than straight
+PART = 0.75  # of the way that variances of legs go at once
+TURNED_BACK = 0.5  # of that, whenever they turn back by more than half of what they were to go
 GROSS = 16.27  # chi-square of three beyond which a look counts less: one in a thousand
+
+
+class Swing:
+    """Variances on their way to others, by their logarithms; most of the way, for a whole step goes too far."""
+
+    def __init__(self) -> None:
+        self._part, self._last = PART, np.zeros(1)
+
+    def part_of_way(self, before: Array, after: Array) -> Array:
+        """Variances to go on with; a part of the way that gets less whenever they turn back by nearly as much."""
+        change = np.log(after / before)
+        if np.sum(change * self._last) < -0.5 * np.sum(self._last**2):
+            self._part *= TURNED_BACK
+        self._last = change
+        return np.asarray(before * (after / before) ** self._part)
 
 
 def adjust_hole(
@@ -66,37 +86,36 @@ def adjust_hole(
     if len(now.extra) != len(extra.std):
         now = replace(now, extra=np.zeros(len(extra.std)))
     known, is_learnt = string_information(string, extra), now.is_learnt
-    is_bent, tried = is_learnt, list[tuple[float, float]]()
-    for again in range(ITERATIONS):
+    is_settled = is_learnt  # where it begins: so what is known of each unknown beside the others is no matter
+    turns = poor_yaws(looks, len(path.md))
+    is_bent, tried, swing = is_learnt, list[tuple[float, float]](), Swing()
+    for again in range(ITERATIONS + FURTHER):
         bases = carried_bases(now.tangents)
         linear = linearise_all(looks, now, bases, extra)
         solution = solve_equations(
             looks, linear, path_equations(path, now, bases), known, string_departure(string, now), extra
         )
-        if not np.isfinite(solution.step):
+        step = solution.decrement if is_settled else solution.step
+        if not np.isfinite(step):
             raise np.linalg.LinAlgError("expected a step of the unknowns, got numbers that are none")
-        now = _stepped(now, bases, solution)
+        now = _stepped(now, bases, solution, turns)
         found = Adjusted(looks, string, path, extra, now, linear, solution, known)
         if not is_learnt:
             play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)
             if again and not is_bent:  # the first step was not along the sphere
                 whole, legs = learnt_curvature(found)
                 is_bent = bool(np.all(np.abs(np.log(legs / now.leg_vars)) <= LEGS_SETTLED))
-            is_learnt = solution.step < NEAR and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var and is_bent
-        if is_learnt and solution.step < SETTLED:
+            is_learnt = step < NEAR and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var and is_bent
+        is_learnt |= again >= ITERATIONS
+        if is_learnt and step < SETTLED:
             break
         if not is_learnt:
-            tried = [*tried, (now.play_var, play)] if solution.step < NEAR else []
+            tried = [*tried, (now.play_var, play)] if step < NEAR else []
             now = replace(now, play_var=faster_play(tried) if tried else play)
-        if again and not is_bent:
-            between = part_of_way(np.append(now.leg_vars, now.curvature_var), np.append(legs, whole))
+        if again and not is_learnt and not is_bent:
+            between = swing.part_of_way(np.append(now.leg_vars, now.curvature_var), np.append(legs, whole))
             now = replace(now, curvature_var=float(between[-1]), leg_vars=between[:-1])
     return found
-
-
-def part_of_way(before: Array, after: Array) -> Array:
-    """Most of the way from variances to others, by their logarithms, for a whole step goes too far."""
-    return np.asarray(before * (after / before) ** PART)
 
 
 def linearise_all(looks: Looks, now: StartingPoint, bases: Array, extra: FurtherEffects) -> Linearised:
@@ -128,14 +147,16 @@ def solve_equations(
     equations = gather_equations(looks, linear, of_path, known, departure, extra)
     diagonal, tied, coupled, in_common = equations.diagonal, equations.tied, equations.coupled, equations.in_common
     eliminate_path(diagonal, tied, coupled)
-    wide = coupled.reshape(-1, coupled.shape[2])
+    wide, size, own = coupled.reshape(-1, coupled.shape[2]), len(known), coupled[:, :, -1]
+    whole = in_common[:size, :size].copy()
     in_common -= wide.T @ wide
-    size = len(known)
-    cov = np.asarray(np.linalg.inv(in_common[:size, :size]), np.float64)
-    common = cov @ in_common[:size, size]
-    states = (coupled[:, :, size] - coupled[:, :, :size] @ common)[:, :, None].copy()
+    left = InCommon(in_common[:size, :size], in_common[:size, size])
+    states = (own - coupled[:, :, :size] @ left.step)[:, :, None].copy()
     substitute_path(diagonal, tied, states)
-    return LinearSolution(diagonal, tied, coupled[:, :, :size], cov, common, states[:, :, 0])
+    gain = float(np.sum(own * own))
+    return LinearSolution(
+        diagonal, tied, coupled[:, :, :size], left, states[:, :, 0], gain, equations.at_station, whole
+    )
 
 
 def gather_equations(
@@ -160,15 +181,22 @@ def gather_equations(
     diagonal[:, :2, :2] += at_station
     coupled[:, :2] = by_direction
     coupled[:, :, size] += right
-    return Equations(diagonal, tied, coupled, in_common)
+    return Equations(diagonal, tied, coupled, in_common, at_station)
 
 
-def _stepped(now: StartingPoint, bases: Array, solution: LinearSolution) -> StartingPoint:
-    """Where the unknowns stand after a step."""
+def poor_yaws(looks: Looks, count: int) -> Truths:
+    """Which of the stations (count,) have looks, and of no look there a yaw that is known well."""
+    best = np.full(count, np.inf)
+    np.minimum.at(best, looks.station, looks.yaw_var)
+    return np.asarray(np.isfinite(best) & (best > POOR_YAW**2))
+
+
+def _stepped(now: StartingPoint, bases: Array, solution: LinearSolution, turns: Truths) -> StartingPoint:
+    """Where the unknowns stand after a step, which turns some directions about the vertical."""
     size = now.tubes.size
     make_ups = slice(size + 1, size + 1 + len(now.make_ups))
     return StartingPoint(
-        step_directions(now.tangents, bases, solution.states[:, :2]),
+        step_about_vertical(now.tangents, bases, solution.states[:, :2], turns),
         now.curvatures + solution.states[:, 2:],
         now.tubes + solution.common[:size].reshape(-1, OF_TUBE),
         now.make_ups + solution.common[make_ups],

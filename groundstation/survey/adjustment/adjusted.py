@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.kernels.path_elimination import path_covariances, reduce_right, substitute_path
+from groundstation.survey.adjustment.linear_solution import LinearSolution
 from groundstation.survey.adjustment.looks import (
     OF_TUBE,
     TURN,
@@ -20,6 +21,7 @@ from groundstation.survey.adjustment.looks import (
 )
 
 Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,25 +34,6 @@ class Linearised:
     residuals: Array
     squares: Array
     gravity_at: int  # place of gravity among what stations have in common, behind the tubes
-
-
-@dataclass(frozen=True, slots=True)
-class LinearSolution:
-    """The factorised chain, the covariance (p, p) of what stations have in common, and the step."""
-
-    diagonal: Array
-    tied: Array
-    coupled: Array  # (s + 1, 4, p)
-    cov: Array
-    common: Array  # (p,)
-    states: Array  # (s + 1, 4)
-
-    @property
-    def step(self) -> float:
-        """Largest step of an unknown in its standard deviations, at most as the equations know them; NaN if one is."""
-        of_common = np.max(np.abs(self.common) / np.sqrt(np.diag(self.cov)), initial=0.0)
-        rigid = np.einsum("kab,kab->ka", self.diagonal, self.diagonal)  # of what is left of each block
-        return float(np.maximum(of_common, np.max(np.abs(self.states) * np.sqrt(rigid))))
 
 
 @dataclass(frozen=True)  # with a dictionary, for what is worked out once
@@ -105,6 +88,12 @@ class Adjusted:
         return np.asarray((flat @ self.common_root).reshape(self.by_common.shape))
 
     @cached_property
+    def direction_columns(self) -> Array:
+        """Change of every direction (s + 1, 2, p), likewise: half of the work, where curvatures are not asked for."""
+        flat = np.ascontiguousarray(self.by_common[:, :2]).reshape(-1, len(self.common_cov))
+        return np.asarray((flat @ self.common_root).reshape(-1, 2, len(self.common_cov)))
+
+    @cached_property
     def common_root(self) -> Array:
         """Lower triangular root (p, p) of that covariance."""
         return np.asarray(np.linalg.cholesky(self.common_cov))
@@ -113,6 +102,11 @@ class Adjusted:
     def covs(self) -> Array:
         """Covariances (s + 1, 4, 4) of direction and curvature at collar and stations."""
         return np.asarray(self.own_covs + self.columns @ np.swapaxes(self.columns, 1, 2))
+
+    def cov_at(self, place: int) -> Array:
+        """Covariance (4, 4) of direction and curvature at one place from the collar down."""
+        columns = self.by_common[place] @ self.common_root
+        return np.asarray(self.own_covs[place] + columns @ columns.T)
 
     @cached_property
     def left(self) -> Array:
@@ -141,24 +135,26 @@ class Adjusted:
         right = np.zeros((*self.solution.diagonal.shape[:2], directions.shape[2]))
         right[:, :2] = directions
         reduce_right(self.solution.diagonal, self.solution.tied, right)
-        of_path = np.einsum("jap,jar->pr", self.solution.coupled, right)
+        width = right.shape[2]
+        of_path = self.solution.coupled.reshape(-1, len(self.common_cov)).T @ right.reshape(-1, width)
         substitute_path(self.solution.diagonal, self.solution.tied, right)
         found = self.common_cov @ (common - of_path)
-        return right + self.by_common @ found, found
+        states = right + (self.by_common.reshape(-1, len(found)) @ found).reshape(right.shape)
+        return states, found
 
-    @cached_property
-    def redundancies(self) -> Array:
-        """Part P_k (n, 3, 3) of the inverse covariance of every look that is free to contradict: W - W J Q J^T W."""
+    def free_parts(self, rows: Places) -> Array:
+        """Part P_k (r, 3, 3) of the inverse covariance of some looks that is free to contradict: W - W J Q J^T W."""
         from groundstation.survey.adjustment.kernels.free_parts import free_parts
 
-        found = np.empty((len(self.looks), 3, 3))
-        direction = np.ascontiguousarray(self.by_common[:, :2])
-        with_common = (direction.reshape(-1, len(self.common_cov)) @ self.common_cov).reshape(direction.shape)
+        looks, size = self.looks.part(rows), len(self.common_cov)
+        seen, station = np.unique(looks.station, return_inverse=True)
+        columns = self.direction_columns[seen]
+        of_direction = self.own_covs[seen, :2, :2] + columns @ np.swapaxes(columns, 1, 2)
+        with_common = (self.by_common[seen, :2].reshape(-1, size) @ self.common_cov).reshape(columns.shape)
+        found = np.empty((len(rows), 3, 3))
         free_parts(
-            self.looks.station, self.looks.tube, self.looks.make_up, self.linear.jacobians, self.linear.weights,
-            self.extra.columns,
-            OF_TUBE * self.string.count, self.covs[:, :2, :2].copy(),
-            with_common, self.common_cov, found,
+            station.astype(np.intp), looks.tube, looks.make_up, self.linear.jacobians[rows], self.linear.weights[rows],
+            self.extra.columns[rows], self.linear.gravity_at, of_direction, with_common, self.common_cov, found,
         )  # fmt: skip
         return found
 
@@ -170,4 +166,5 @@ class Adjusted:
     @property
     def redundancy(self) -> float:
         """What that sum is to be."""
-        return float(np.einsum("kab,kba->", self.redundancies, np.linalg.inv(self.linear.weights)))
+        told = self.solution.told_by(self.own_covs[:, :2, :2], self.direction_columns, self.known)
+        return float(self.linear.residuals.size - told)

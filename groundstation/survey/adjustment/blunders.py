@@ -19,6 +19,7 @@ from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.collar import collar_departure
 from groundstation.survey.adjustment.hypotheses import BY_DEPTH, KNOWN_SIZE, WIDTHS, Hypothesis, all_hypotheses
+from groundstation.survey.adjustment.hypothesis_count import count_hypotheses
 from groundstation.survey.adjustment.looks import Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.scores import Score, log_chances, log_tail, score_hypotheses
@@ -45,7 +46,8 @@ class Explanation:
     ----------
     hypothesis : what it is
     size, cov : (q,) and (q, q), m/s^2 (a second, of a creep), rad or m; empty where the size is known
-    log_chance : natural logarithm of the chance that an honest hole shows as much, all hypotheses and stops counted
+    log_chance : natural logarithm of the chance that an honest hole shows as much, all hypotheses and stops counted:
+        how many would on the mean, so that it is above zero where nothing is explained
     """
 
     hypothesis: Hypothesis
@@ -89,20 +91,35 @@ class Examination:
 
     Parameters
     ----------
-    adjusted : with the blunders and the suspicion taken in
+    adjusted : with the blunders taken in
     blunders : those known before first
-    suspicion : what may be wrong, but not beyond the false alarms of a whole hole; it is not told as a fault, and
-        the covariance has it in it
+    suspicion : what may be wrong, but not beyond the false alarms of a whole hole; it is not told as a fault
+    supposed : the same hole were the suspicion true; None where nothing is suspected
     """
 
     adjusted: Adjusted
     blunders: tuple[Blunder, ...] = ()
     suspicion: Blunder | None = None
+    supposed: Adjusted | None = None
+
+    @property
+    def explained(self) -> Adjusted:
+        """The hole with all that was found, the suspicion too."""
+        return self.adjusted if self.supposed is None else self.supposed
+
+    @property
+    def suspected(self) -> Array:
+        """By how much each direction (s + 1, 2), rad about two axes, would be another one were the suspicion true.
+
+        It is one standard deviation more: most suspicions are none, so none moves a direction.
+        """
+        off = self.explained.now.tangents - self.adjusted.now.tangents
+        return np.asarray(np.einsum("kai,ki->ka", self.adjusted.bases, off))
 
     @property
     def taken_in(self) -> tuple[Hypothesis, ...]:
         """What the adjustment has as further unknowns or put right in its looks, in its order."""
-        return _taken_in([*self.blunders, *filter(None, [self.suspicion])])
+        return _taken_in(self.blunders)
 
     @property
     def global_ratio(self) -> float:
@@ -133,20 +150,22 @@ def examine_hole(
     """
     known = tuple(_judged_again(looks, string, path, run, known, place) for place in range(len(known)))
     now = _begun(looks, string, path, run, _taken_in(known), start)
-    found, suspicion = list(known), None
+    found = list(known)
+    suspicion, supposed = None, None
     while suspicion is None and len(found) < MOST_BLUNDERS and is_suspicious(now.found, run):
         blunder = find_blunder(looks, string, path, run, now, _taken_in(found))
         if blunder is None or blunder.best.log_chance > math.log(SUSPECTED) + log_of_stops(looks):
             break
         if blunder.best.log_chance <= math.log(FALSE_ALARM):
             found.append(blunder)
-        elif len(np.unique(looks.tube)) > 1:
-            suspicion = blunder
-        else:
+            now = adjust_with(looks, string, path, run, _taken_in(found), now.found.now)
+            continue
+        if len(np.unique(looks.tube)) == 1:
             break  # of one tube alone only what is known of path and collar speaks against it
-        now = adjust_with(looks, string, path, run, _taken_in([*found, *filter(None, [suspicion])]), now.found.now)
+        suspicion = blunder
+        supposed = adjust_with(looks, string, path, run, _taken_in([*found, blunder]), now.found.now).found
     blunders = tuple(_resized(one, now, _taken_in(found)) for one in found)
-    return Examination(now.found, blunders, suspicion)
+    return Examination(now.found, blunders, suspicion, supposed)
 
 
 def _begun(
@@ -185,9 +204,13 @@ def examine_known(
     before : of fewer looks, whose stations, stops and tubes have the places that they had
     """
     known, suspicion = ((), None) if before is None else (before.blunders, before.suspicion)
-    now = _begun(looks, string, path, run, _taken_in([*known, *filter(None, [suspicion])]), start)
+    now = _begun(looks, string, path, run, _taken_in(known), start)
     blunders = tuple(_resized(one, now, _taken_in(known)) for one in known)
-    return Examination(now.found, blunders, suspicion), is_suspicious(now.found, run)
+    supposed = None
+    if suspicion is not None:
+        supposed = adjust_with(looks, string, path, run, _taken_in([*known, suspicion]), now.found.now).found
+    found = Examination(now.found, blunders, suspicion, supposed)
+    return found, is_suspicious(found.explained, run)
 
 
 def _resized(blunder: Blunder, now: TakenIn, taken_in: tuple[Hypothesis, ...]) -> Blunder:
@@ -259,7 +282,7 @@ def chance_of_one(looks: Looks, run: RunOfStops) -> float:
 
 def log_of_level(looks: Looks, run: RunOfStops) -> float:
     """Logarithm of how many chances an honest hole has: of all hypotheses, and of all stops."""
-    hypotheses = 1 + sum(1 for _ in all_hypotheses(looks, run))  # and the collar
+    hypotheses = 1 + count_hypotheses(looks, run)  # and the collar
     return math.log(hypotheses) + log_of_stops(looks)
 
 
@@ -307,7 +330,7 @@ def _explained(with_one: TakenIn, found: Adjusted, one: Hypothesis, many: float)
     squares = math.expm1(min(gain / free, 500.0)) * free
     told = np.array([WIDTHS[one.kind]])
     chance = float(log_tail(np.array([squares]), told, np.array([free]))[0]) + many
-    return Explanation(one, with_one.sizes[-1], with_one.covs[-1], min(0.0, chance))
+    return Explanation(one, with_one.sizes[-1], with_one.covs[-1], chance)
 
 
 def _judged_again(

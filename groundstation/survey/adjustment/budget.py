@@ -72,29 +72,31 @@ def error_budget(found: Adjusted, weights: Array, causes: TurnCauses) -> list[Er
     return [*_of_looks(found, moved_looks(found, states, common)), *_of_priors(found, states, common, causes)]
 
 
-def prior_shares(found: Adjusted, weights: Array, causes: TurnCauses) -> list[ErrorShare]:
-    """Shares as of ``error_budget`` of all that is no error of a single look."""
-    return _of_priors(found, *_spread(found, weights), causes)
-
-
 def _spread(found: Adjusted, weights: Array) -> tuple[Array, Array]:
     """Covariance of states (s + 1, 4, r) and of what is in common (p, r) with the functionals."""
     return found.cofactor(weights, np.zeros((len(found.common_cov), weights.shape[2])))
 
 
 def _of_priors(found: Adjusted, states: Array, common: Array, causes: TurnCauses) -> list[ErrorShare]:
+    collar, path = _of_path(found, states)
+    return [
+        *shares_of_string(found, common, causes),
+        ErrorShare(ShareSource.COLLAR, -1, collar),
+        ErrorShare(ShareSource.PATH, -1, path),
+    ]
+
+
+def shares_of_string(found: Adjusted, common: Array, causes: TurnCauses) -> list[ErrorShare]:
+    """Shares of tubes, turns, gravity and blunders, by what functionals have in common (p, r)."""
     tubes = common[: OF_TUBE * found.string.count].reshape(found.string.count, OF_TUBE, -1)
     of_string = found.string.count * OF_TUBE
     further = common[found.string.width :] ** 2 / (found.extra.std[:, None] ** 2)
     gravity = common[of_string] ** 2 / found.string.gravity_std**2
-    collar, path = _of_path(found, states)
     return [
         *_by_tube(ShareSource.BIAS, np.sum(tubes[:, BIAS] ** 2, axis=1) / found.string.bias_std[:, None] ** 2),
         *_by_tube(ShareSource.TILT, np.sum(tubes[:, TILT] ** 2, axis=1) / found.string.tilt_std[:, None] ** 2),
         *_of_turns(found, common[turn_places(found.string)], causes),
         ErrorShare(ShareSource.GRAVITY, -1, gravity),
-        ErrorShare(ShareSource.COLLAR, -1, collar),
-        ErrorShare(ShareSource.PATH, -1, path),
         *_by_tube(ShareSource.BLUNDER, further),
     ]
 
@@ -107,13 +109,13 @@ def _of_looks(found: Adjusted, moved: Array) -> list[ErrorShare]:
     """Noise of the force, play and noise of the yaw; what a look that counts less adds is theirs in proportion."""
     looks, linear = found.looks, found.linear
     pulled = linear.weights @ moved
-    whole = np.einsum("kar,kar->kr", pulled, moved)
-    play = np.swapaxes(linear.jacobians[:, :, 5:7], 1, 2) @ pulled
-    yaw = np.einsum("ka,kar->kr", linear.jacobians[:, :, 7], pulled)
+    whole = np.sum(pulled * moved, axis=1)
+    turned = np.swapaxes(linear.jacobians[:, :, 5:8], 1, 2) @ pulled
+    squares = turned * turned
     parts = np.stack([
-        looks.force_var[:, None] * np.sum(pulled**2, axis=1),
-        found.now.play_var * np.sum(play**2, axis=1),
-        looks.yaw_var[:, None] * yaw**2,
+        looks.force_var[:, None] * np.sum(pulled * pulled, axis=1),
+        found.now.play_var * np.sum(squares[:, :2], axis=1),
+        looks.yaw_var[:, None] * squares[:, 2],
     ])  # fmt: skip
     total = parts.sum(axis=0)
     shares = np.sum(parts * np.where(total > 0.0, whole / np.where(total > 0.0, total, 1.0), 0.0), axis=1)

@@ -49,7 +49,7 @@ def collar_departure(found: Adjusted) -> CollarDeparture:
     at_collar[:2, :2] = bases[0] @ found.path.collar_cov @ bases[0].T + KNOWN * np.eye(2)
     at_collar[2:, 2:] = found.path.curvature_std**2 * np.eye(2)
     led_to, by_leg = go[0] @ at_collar @ go[0].T, np.asarray(np.linalg.inv(rigid[0]), np.float64)
-    known = np.asarray(np.linalg.inv(found.covs[1]), np.float64)
+    known = np.asarray(np.linalg.inv(found.cov_at(1)), np.float64)
     ends = np.stack([now.tangents[0], found.path.collar, now.tangents[0], now.tangents[1]])
     to_told, _, to_station = bends_between(ends, bases[:1].repeat(4, axis=0))
     pulled = known @ np.concatenate([to_station - to_told, now.curvatures[1]])

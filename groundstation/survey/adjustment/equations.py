@@ -30,13 +30,15 @@ KNOWN = 1e-16  # rad^2, least variance of what is given as known
 class Equations:
     """Normal equations: (s + 1, 4, 4) blocks of the path and between stations, (s + 1, 4, p + 1) and (p + 1, p + 1).
 
-    The last column of ``coupled`` and ``in_common`` is the right side.
+    The last column of ``coupled`` and ``in_common`` is the right side; ``at_station`` (s + 1, 2, 2) is the part of the
+    looks in the information on each direction.
     """
 
     diagonal: Array
     tied: Array
     coupled: Array
     in_common: Array
+    at_station: Array
 
 
 def path_equations(path: PathPrior, start: StartingPoint, bases: Array) -> tuple[Array, Array, Array]:

@@ -32,6 +32,7 @@ SWAPPED = [1, 0, 2]
 OF_FORCE = (K.BIAS_STEPPED, K.BIAS_CREEPS, K.BIAS_WRONG, K.LOOK_WRONG)
 CONSTANT = (K.BIAS_WRONG, K.TILT_WRONG, K.MOUNT_MISREAD, K.JOINT_MISREAD)
 KNOWN_SIZE = (K.AXES_EXCHANGED, K.TUBES_EXCHANGED)  # of amplitude one, put right in the looks themselves
+OF_BEFORE = (K.HOLE_MOVED, K.TUBES_EXCHANGED)  # which change looks before their stop
 BY_TILT = (K.TILT_SLIPPED, K.TILT_WRONG)
 BY_DEPTH = (K.DEPTH_WRONG_ONCE, K.DEPTH_WRONG_FROM)
 OF_CHAIN = (K.JOINT_SLIPPED, K.JOINT_MISREAD, K.ENCODER_SLIPPED, K.ENCODER_DRIFTS)
@@ -149,7 +150,7 @@ def _turned_by(one: Hypothesis, looks: Looks, run: RunOfStops) -> Array:
         return np.ones(len(looks))
     if one.kind is K.ENCODER_DRIFTS:
         return looks.stop.astype(np.float64)  # a belt slips by a part of what it turns, about the same at every stop
-    return np.asarray(run.causes.turned_looks(looks)[run.causes.names.index((JOINT, one.subject[0]))])
+    return run.causes.turned_by(run.causes.names.index((JOINT, one.subject[0])), looks)
 
 
 def all_hypotheses(looks: Looks, run: RunOfStops) -> Iterator[Hypothesis]:
@@ -208,15 +209,21 @@ def _of_joints(looks: Looks, run: RunOfStops, onsets: set[int]) -> Iterator[Hypo
             yield from (Hypothesis(K.JOINT_SLIPPED, (tube,), stop) for stop in stops[1:] if stop in onsets)
 
 
+def stations_seen_twice(looks: Looks, onsets: set[int]) -> npt.NDArray[np.bool_]:
+    """Which stations (o, s + 1) were looked at before and from each of the onsets on, these in their order."""
+    stops, count = np.array(sorted(onsets), np.intp)[:, None], int(looks.station.max(initial=0)) + 1
+    first, last = np.full(count, np.iinfo(np.intp).max), np.full(count, -1)
+    np.minimum.at(first, looks.station, looks.stop)
+    np.maximum.at(last, looks.station, looks.stop)
+    return np.asarray((first < stops) & (stops <= last))
+
+
 def _of_hole(looks: Looks, onsets: set[int]) -> Iterator[Hypothesis]:
     """Neighbouring stations that moved together, or all that were looked at before a stop and from it on."""
-    last = int(looks.station.max(initial=0))
-    for stop in sorted(onsets):
-        since = looks.stop >= stop
-        before = np.bincount(looks.station[~since], minlength=last + 1) > 0
-        seen = np.flatnonzero((np.bincount(looks.station[since], minlength=last + 1) > 0) & before).tolist()
+    for stop, is_seen in zip(sorted(onsets), stations_seen_twice(looks, onsets), strict=True):
+        seen = np.flatnonzero(is_seen).tolist()
         for first, width in itertools.product(seen, range(2, MOST_MOVED + 1)):
-            if set(range(first, first + width)) <= set(seen):
+            if is_seen[first : first + width].sum() == width:
                 yield Hypothesis(K.HOLE_MOVED, (first, first + width - 1), stop)
         if len(seen) > MOST_MOVED:
             yield Hypothesis(K.HOLE_MOVED, (seen[0], seen[-1]), stop)

@@ -5,7 +5,7 @@ Frame: north, east, down; a tube's own frame has x and y across it and z downhol
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 import numpy.typing as npt
@@ -42,6 +42,10 @@ class Looks:
 
     def __len__(self) -> int:
         return len(self.station)
+
+    def part(self, rows: Places) -> Looks:
+        """Some of them, by their rows."""
+        return Looks(*(getattr(self, one.name)[rows] for one in fields(self)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -115,7 +115,7 @@ def _covariances(found: Adjusted, last: Places, length: float) -> tuple[Array, f
     reduced = wanted.copy()
     reduce_right(found.solution.diagonal, found.solution.tied, reduced)
     flat = reduced.reshape(-1, reduced.shape[2])
-    by_common = _by_common(found, wanted, 2 * count)
+    by_common = _by_common(found, wanted, last)
     of_states = flat.T @ flat + by_common.T @ found.common_cov @ by_common
     new = np.zeros((wanted.shape[2], 2))
     new[np.flatnonzero(found.looks.station[last] == len(found.path.md) - 1)[:, None] * 2 + [0, 1], [0, 1]] = 1.0
@@ -147,13 +147,15 @@ def _covariances_in_common(found: Adjusted, last: Places) -> tuple[Array, Array]
     return of_looks, of_all
 
 
-def _by_common(found: Adjusted, wanted: Array, of_looks: int) -> Array:
-    """Change (p, r) of the wanted functionals with what is in common; those of looks have no part far up the hole."""
-    first = int(np.flatnonzero(np.any(wanted[:, :, :of_looks], axis=(1, 2)))[0])
+def _by_common(found: Adjusted, wanted: Array, last: Places) -> Array:
+    """Change (p, r) of the wanted functionals with what is in common; that of a look is of one station."""
+    at = np.minimum(found.looks.station[last] + 1, len(found.path.md) - 1)
+    of_looks = 2 * len(last)
+    here = wanted[at, :, :of_looks].reshape(len(last), -1, len(last), 2)[np.arange(len(last)), :, np.arange(len(last))]
+    looks = (np.swapaxes(found.by_common[at], 1, 2) @ here).transpose(1, 0, 2)
     width = found.by_common.shape[2]
-    looks = found.by_common[first:].reshape(-1, width).T @ wanted[first:, :, :of_looks].reshape(-1, of_looks)
     toe = found.by_common.reshape(-1, width).T @ wanted[:, :, of_looks:].reshape(-1, wanted.shape[2] - of_looks)
-    return np.concatenate([looks, toe], axis=1)
+    return np.concatenate([looks.reshape(width, -1), toe], axis=1)
 
 
 def _wanted_states(found: Adjusted, last: Places, lever: float, length: float) -> Array:
@@ -188,4 +190,15 @@ def _gains(jacobians: Array, noise: Array, cov: Array, of_toe: Array) -> Array:
         at = slice(3 * place, 3 * place + 3)
         spread[:, at, at] += noise[:, place]
     seen = (jacobians @ of_toe).reshape(many, 3 * count, 3)
-    return np.asarray(np.einsum("amr,amr->a", seen, np.linalg.solve(spread, seen)))
+    return np.array([_square_of(one, its_spread) for one, its_spread in zip(seen, spread, strict=True)])
+
+
+def _square_of(seen: Array, spread: Array) -> float:
+    """Square of columns (m, 3) weighed by the inverse of a covariance (m, m)."""
+    from scipy.linalg import lapack
+
+    factor, failed = lapack.dpotrf(spread.T, lower=1)  # symmetric: as the library lays out its matrices
+    if failed:
+        raise np.linalg.LinAlgError("expected a covariance of the looks to come that is positive definite")
+    whitened, _ = lapack.dtrtrs(factor, seen, lower=1)
+    return float(np.sum(whitened * whitened))

@@ -18,12 +18,13 @@ import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
-from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, Hypothesis, effect_of
+from groundstation.survey.adjustment.hypotheses import KNOWN_SIZE, WIDTHS, Hypothesis
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
-from groundstation.survey.adjustment.scores import MOST_AT_ONCE, UNTOLD, free_information
+from groundstation.survey.adjustment.scores import MOST_AT_ONCE, UNTOLD, columns_together, free_information, rows_since
 from groundstation.survey.adjustment.toe_weights import moved_looks
 
 Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
 FOUND_WITH, FALSE_ALARM_OF_ONE = 0.8, 1e-3
 
 
@@ -77,15 +78,15 @@ def measure_reliability(
     sizes : size that a blunder of a kind may have, for where it would not be found
     chance, power : of a false alarm of one test; of finding. ``chance_of_one`` of ``blunders`` is that of a whole hole
     """
-    moved = moved_by_functional(found, weights)
+    spread = found.cofactor(weights, np.zeros((len(found.common_cov), weights.shape[2])))
     told: dict[Hypothesis, Reliability] = {}
     for width, same in itertools.groupby(sorted(hypotheses, key=_width_of), key=_width_of):
         needed = least_noncentrality(width, chance, power)
         part = list(dict.fromkeys(same))
-        every = max(1, MOST_AT_ONCE // (9 * width * max(1, len(found.looks))))
+        every = max(1, MOST_AT_ONCE // (9 * width * max(1, len(rows_since(found.looks, part)))))
         for at in range(0, len(part), every):
             some = part[at : at + every]
-            told |= zip(some, _of_alike(found, run, some, moved, sizes, needed), strict=True)
+            told |= zip(some, _of_alike(found, run, some, spread, sizes, needed), strict=True)
     return [told[one] for one in hypotheses]
 
 
@@ -93,40 +94,56 @@ def _width_of(one: Hypothesis) -> int:
     return WIDTHS[one.kind]
 
 
-def moved_by_functional(found: Adjusted, weights: Array) -> Array:
-    """W A Q w (n, 3, r): how much a unit of force in each look moves each functional."""
-    states, common = found.cofactor(weights, np.zeros((len(found.common_cov), weights.shape[2])))
-    return np.asarray(found.linear.weights @ moved_looks(found, states, common))
-
-
 def _of_alike(
     found: Adjusted,
     run: RunOfStops,
     part: Sequence[Hypothesis],
-    moved: Array,
+    spread: tuple[Array, Array],
     sizes: Mapping[BlunderKind, float],
     needed: float,
 ) -> Iterator[Reliability]:
-    """Reliability of blunders of one width q, which are found from a non-centrality on."""
-    columns = np.zeros((len(found.looks), 3, len(part), WIDTHS[part[0].kind]))
-    for place, one in enumerate(part):
-        rows, effect = effect_of(one, found.looks, run, found.now, found.linear)
-        columns[rows, :, place] = effect
-    whole, free = free_information(found, np.arange(len(found.looks)), columns)
-    effects = np.einsum("kahq,kar->hqr", columns, moved)
-    for one, effect, its_whole, its_free in zip(part, effects, whole, free, strict=True):
-        yield _of_one(one, effect, its_whole, its_free, sizes, needed)
+    """Reliability of blunders of one width q, which are found from a non-centrality on.
 
-
-def _of_one(
-    one: Hypothesis, effect: Array, whole: Array, free: Array, sizes: Mapping[BlunderKind, float], needed: float
-) -> Reliability:
-    """Reliability of a blunder by what one unit of it does to each functional (q, r), and its information (q, q)."""
-    size = 1.0 if one.kind in KNOWN_SIZE else sizes.get(one.kind, np.inf)
-    by_size = np.linalg.norm(effect, axis=0)
-    by_size = np.where(by_size > 0.0, by_size * size, 0.0) if np.isfinite(size) else np.full(len(by_size), np.inf)
+    Parameters
+    ----------
+    spread : Q w, covariance of the functionals with the states (s + 1, 4, r) and what is in common (p, r)
+    """
+    rows, columns = columns_together(found, run, part)
+    whole, free = _information(found, rows, columns)
+    moved = found.linear.weights[rows] @ moved_looks(found, *spread, rows)  # W A Q w (k, 3, r)
+    effects = np.tensordot(columns, moved, axes=((0, 1), (0, 1)))
     values, vectors = np.linalg.eigh(free)
-    if values[0] <= UNTOLD * max(float(np.trace(whole)), 1e-300):
-        return Reliability(one, np.inf, np.full(effect.shape[1], np.inf), by_size)
-    at_toe = np.sqrt(needed * np.sum((vectors.T @ effect) ** 2 / values[:, None], axis=0))
-    return Reliability(one, float(np.sqrt(needed / values[0])), at_toe, by_size)
+    is_told = values[:, 0] > UNTOLD * np.maximum(np.einsum("hqq->h", whole), 1e-300)
+    safe = np.where(is_told[:, None], values, 1.0)
+    at_toe = np.sqrt(needed * np.sum((np.swapaxes(vectors, 1, 2) @ effects) ** 2 / safe[:, :, None], axis=1))
+    at_toe, smallest = (
+        np.where(is_told[:, None], at_toe, np.inf),
+        np.where(is_told, np.sqrt(needed / safe[:, 0]), np.inf),
+    )
+    across = np.linalg.norm(effects, axis=1)
+    for one, least, unfound, by_one in zip(part, smallest.tolist(), at_toe, across, strict=True):
+        yield Reliability(one, least, unfound, _by_size(one, by_one, sizes))
+
+
+def _by_size(one: Hypothesis, by_one: Array, sizes: Mapping[BlunderKind, float]) -> Array:
+    """What a blunder of the size of its kind does to each functional (r,), by what one unit of it does."""
+    size = 1.0 if one.kind in KNOWN_SIZE else sizes.get(one.kind, np.inf)
+    return np.where(by_one > 0.0, by_one * size, 0.0) if np.isfinite(size) else np.full(len(by_one), np.inf)
+
+
+def _information(found: Adjusted, rows: Places, columns: Array) -> tuple[Array, Array]:
+    """Information and the part that is free, as of ``free_information``; that of a single look is told by that look."""
+    is_in = np.asarray(columns.any(axis=(1, 3)))  # (r, h)
+    alone = np.flatnonzero(is_in.sum(axis=0) == 1)
+    others = np.setdiff1d(np.arange(columns.shape[2]), alone)
+    whole, free = np.zeros((2, columns.shape[2], columns.shape[3], columns.shape[3]))
+    if len(alone):
+        look = is_in[:, alone].argmax(axis=0)
+        effect = columns[look, :, alone]
+        back = np.swapaxes(effect, 1, 2)
+        whole[alone] = back @ found.linear.weights[rows[look]] @ effect
+        free[alone] = back @ found.free_parts(rows[look]) @ effect
+    if len(others):
+        touched = is_in[:, others].any(axis=1)
+        whole[others], free[others] = free_information(found, rows[touched], columns[touched][:, :, others])
+    return whole, free

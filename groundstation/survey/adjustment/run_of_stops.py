@@ -43,6 +43,10 @@ class TurnCauses:
         """Change (c, n) of the yaw that each look reports for one radian of each."""
         return np.asarray(self.of_tubes[:, looks.tube] + self.of_make_ups[:, looks.make_up])
 
+    def turned_by(self, place: int, looks: Looks) -> Array:
+        """The same (n,) of one of them."""
+        return np.asarray(self.of_tubes[place, looks.tube] + self.of_make_ups[place, looks.make_up])
+
 
 @dataclass(frozen=True, slots=True)
 class RunOfStops:

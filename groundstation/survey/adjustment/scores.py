@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.hypotheses import WIDTHS, Hypothesis, effect_of
+from groundstation.survey.adjustment.hypotheses import OF_BEFORE, WIDTHS, Hypothesis, effect_of
 from groundstation.survey.adjustment.kernels.path_elimination import reduce_right
+from groundstation.survey.adjustment.looks import Looks
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 
 Array = npt.NDArray[np.float64]
@@ -58,18 +59,33 @@ def score_hypotheses(found: Adjusted, run: RunOfStops, hypotheses: Iterable[Hypo
 
 
 def _score_part(found: Adjusted, run: RunOfStops, part: Sequence[Hypothesis]) -> Score:
-    width = WIDTHS[part[0].kind]
-    columns = np.zeros((len(found.looks), 3, len(part), width))
-    touched = np.zeros(len(found.looks), bool)
-    for place, one in enumerate(part):
-        rows, effect = effect_of(one, found.looks, run, found.now, found.linear)
-        columns[rows, :, place] = effect
-        touched[rows] = True
-    rows = np.flatnonzero(touched)
+    rows, columns = columns_together(found, run, part)
     pulled = np.einsum("kab,kb->ka", found.linear.weights[rows], found.left[rows])
-    scores = np.einsum("kahq,ka->hq", columns[rows], pulled)
-    whole, free = free_information(found, rows, columns[rows])
+    scores = np.einsum("kahq,ka->hq", columns, pulled)
+    whole, free = free_information(found, rows, columns)
     return Score(tuple(part), *best_sizes(scores, whole, free))
+
+
+def columns_together(found: Adjusted, run: RunOfStops, part: Sequence[Hypothesis]) -> tuple[Places, Array]:
+    """Looks (r,) that hypotheses of one width q change, and the change (r, 3, h, q) of their force by each."""
+    late = rows_since(found.looks, part)
+    looks, linear = found.looks.part(late), replace(found.linear, jacobians=found.linear.jacobians[late])
+    effects = [effect_of(one, looks, run, found.now, linear) for one in part]
+    touched = np.zeros(len(late), bool)
+    for rows, _ in effects:
+        touched[rows] = True
+    place_of = np.cumsum(touched) - 1
+    columns = np.zeros((int(touched.sum()), 3, len(part), WIDTHS[part[0].kind]))
+    for place, (rows, effect) in enumerate(effects):
+        columns[place_of[rows], :, place] = effect
+    return late[touched], columns
+
+
+def rows_since(looks: Looks, part: Sequence[Hypothesis]) -> Places:
+    """Looks that hypotheses may change: those since the first of them begins, where none is of what was before."""
+    if any(one.kind in OF_BEFORE for one in part):
+        return np.arange(len(looks))
+    return np.flatnonzero(looks.stop >= min(one.stop for one in part))
 
 
 def free_information(found: Adjusted, rows: Places, columns: Array) -> tuple[Array, Array]:

@@ -8,7 +8,9 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.kernels.carried_bases import carry_bases
 
 Array = npt.NDArray[np.float64]
+Truths = npt.NDArray[np.bool_]
 TINY = 1e-12
+LARGE_TURN = 1.0  # rad, of an azimuth in one step, beyond which a turn about the vertical is no way there
 
 
 def carried_bases(tangents: Array) -> Array:
@@ -41,3 +43,27 @@ def step_directions(tangents: Array, bases: Array, steps: Array) -> Array:
     toward = np.einsum("ka,kai->ki", steps, bases) * np.sinc(angle / np.pi)
     moved = np.cos(angle) * tangents + toward
     return np.asarray(moved / np.linalg.norm(moved, axis=1, keepdims=True))
+
+
+def step_about_vertical(tangents: Array, bases: Array, steps: Array, turns: Truths) -> Array:
+    """Directions (s, 3) after a step (s, 2), rad, which leaves the inclination where it turns the azimuth.
+
+    Where yaws are poor a step is a turn by many degrees, and a great circle would leave the inclination, of which the
+    looks are a thousand times as sure.
+
+    Parameters
+    ----------
+    turns : (s,), which directions are to be turned so; others, and those that turn by more than a rad, go straight on
+    """
+    straight = step_directions(tangents, bases, steps)
+    if not turns.any():
+        return straight
+    x, y, z = tangents.T
+    lean = np.hypot(x, y)
+    north, east, down = np.einsum("ka,kai->ik", steps, bases)
+    far = np.maximum(lean, TINY)
+    turn = (east * x - north * y) / far**2
+    inclination, azimuth = np.arctan2(lean, z) - down / far, np.arctan2(y, x) + turn
+    level = np.sin(inclination)
+    turned = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.cos(inclination)], axis=1)
+    return np.where((turns & (np.abs(turn) < LARGE_TURN))[:, None], turned, straight)

@@ -9,6 +9,7 @@ from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.looks import OF_TUBE, TURN
 
 Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
 
 
 def toe_weights(found: Adjusted) -> Array:
@@ -19,26 +20,20 @@ def toe_weights(found: Adjusted) -> Array:
     return leg_weights(found.path.md)[:, None, None] * found.linear.bases
 
 
-def position_weights(found: Adjusted) -> Array:
-    """Change (s + 1, 2, 3 (s + 1)) of the positions of collar and stations, each as that of ``toe_weights``."""
-    half = 0.5 * np.diff(found.path.md, prepend=0.0)
-    count = len(half)
-    above = np.arange(count)[:, None] < np.arange(count)
-    lengths = half[:, None] * (above | np.eye(count, dtype=bool)) + np.append(half[1:], 0.0)[:, None] * above
-    return np.asarray(np.einsum("kj,kai->kaji", lengths, found.linear.bases).reshape(count, 2, -1))
-
-
 def leg_weights(md: Array) -> Array:
     """Length (s + 1,) of the hole, m, that each direction stands for."""
     half = 0.5 * np.diff(md)
     return np.asarray(np.concatenate([half, [0.0]]) + np.concatenate([[0.0], half]))
 
 
-def moved_looks(found: Adjusted, states: Array, common: Array) -> Array:
-    """Change A x (n, 3, r) of all looks for unknowns x: states (s + 1, 4, r) and what is in common (p, r)."""
-    looks, jacobians, count = found.looks, found.linear.jacobians, OF_TUBE * found.string.count
+def moved_looks(found: Adjusted, states: Array, common: Array, rows: Places | None = None) -> Array:
+    """Change A x (n, 3, r) of all or some looks for unknowns x: states (s + 1, 4, r) and what is in common (p, r)."""
+    looks, jacobians, further = found.looks, found.linear.jacobians, found.extra.columns
+    if rows is not None:
+        looks, jacobians, further = looks.part(rows), jacobians[rows], further[rows]
+    count = OF_TUBE * found.string.count
     tubes = common[:count].reshape(found.string.count, OF_TUBE, -1)[looks.tube]
     tubes[:, TURN] += common[count + 1 + looks.make_up]
     moved = jacobians[:, :, :2] @ states[looks.station, :2] + jacobians[:, :, 2:8] @ tubes
-    moved += jacobians[:, :, 8:9] * common[count] + found.extra.columns @ common[found.string.width :]
+    moved += jacobians[:, :, 8:9] * common[count] + further @ common[found.string.width :]
     return np.asarray(moved)

@@ -13,6 +13,7 @@ from groundstation.survey.adjustment.kernels.path_elimination import (
     reduce_right,
     substitute_path,
 )
+from groundstation.survey.adjustment.kernels.position_sums import position_sums
 
 
 def warm_adjustment() -> None:
@@ -39,6 +40,9 @@ def warm_adjustment() -> None:
     reduce_right(diagonal, tied, coupled)
     substitute_path(diagonal, tied, coupled)
     path_covariances(diagonal, tied, np.zeros((1, 4, 4)))
+    position_sums(
+        diagonal, tied, np.zeros((1, 2, 2)), bases, np.zeros(1), np.zeros(1), np.zeros((1, 2, 3)),
+    )  # fmt: skip
     free_parts(
         first, first, first, jacobians, weights, extra, 6, np.zeros((1, 2, 2)), np.zeros((1, 2, width)),
         np.zeros((width, width)), np.zeros((1, 3, 3)),

@@ -18,6 +18,7 @@ from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.well.analysis import Stretch
 from groundstation.survey.well.reference_frames import TieOn
+from telemetry.toml_tables import parse_toml_tables
 
 PLACE = ("md_m", "inclination_deg", "azimuth_deg", "north_m", "east_m", "tvd_m")
 SMALLEST = -1e-12  # of the largest variance, that rounding may leave
@@ -91,7 +92,7 @@ def _covariance(path: Path, data: dict[str, Any]) -> Any:
 
 def _toml(path: Path, what: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text("utf-8"))
+        return parse_toml_tables(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise SurveyError(f"{path}: {reason}; expected {what}") from error

@@ -62,6 +62,7 @@ class SharedErrors:
         self._transport: list[int] = []
         self._adjusted: list[int] = []
         self._chains: dict[tuple[int, ...] | int, int] = {}
+        self._strings: list[tuple[int, ...] | int] = []  # the same by their numbers
 
     @property
     def count(self) -> int:
@@ -150,11 +151,14 @@ class SharedErrors:
     def chain_of(self, tube: int, above: Sequence[int] | None) -> int:
         """Number of a tube with the joints above it, in the order in which they were met."""
         string = tube if above is None else (tube, *above)
-        return self._chains.setdefault(string, len(self._chains))
+        number = self._chains.setdefault(string, len(self._chains))
+        if number == len(self._strings):
+            self._strings.append(string)
+        return number
 
     def chain(self, number: int) -> tuple[int, tuple[int, ...] | None]:
         """Tube of a chain, and the tubes above it, lowest first; None where their order was not known."""
-        string = list(self._chains)[number]
+        string = self._strings[number]
         return (string, None) if isinstance(string, int) else (string[0], string[1:])
 
     def adjusted_places(self, count: int) -> Places:

@@ -20,7 +20,6 @@ from groundstation.survey.fusion.resolve import UPRIGHT, Direction
 from groundstation.survey.fusion.tangents import tangent_jacobians
 
 Array = npt.NDArray[np.float64]
-LEVEL = np.eye(3)[:2]  # the lean of a unit vector
 UNKNOWN_YAW_VAR = math.pi**2 / 3.0  # rad^2, uniform on the circle, as nodes say it (``telemetry.messages``)
 AS_A_CIRCLE = 1.5  # of the squared lean, second moment along it of a yaw that may be any
 SURE: Array = np.zeros((3, 3))
@@ -90,8 +89,9 @@ def tangent_errors(direction: Direction, jacobian: Array) -> tuple[Array, Packed
     """
     if isinstance(direction, SphereDirection):
         columns = direction.packed
+        lean = Packed.of_values(columns.values[:2], columns.places, columns.width)
         own = direction.own if direction.bow is SURE else direction.own + direction.bow
-        return own, columns.under(LEVEL), columns.values[2].copy()
+        return own, lean, columns.values[2]
     columns = Packed(direction.shared)
     return jacobian @ direction.cov @ jacobian.T, columns, (jacobian @ columns.values)[2].copy()
 

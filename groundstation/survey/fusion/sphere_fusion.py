@@ -78,7 +78,8 @@ def fuse_on_sphere(
     seen = _Seen(now[station], across[station], tangents, all_yaws, along, alone)
     weights = np.linalg.inv(seen.covs(totals, all_yaws))
     gains = np.linalg.inv(np.add.reduceat(weights, begin[:-1]))[station] @ weights
-    random = gains @ seen.covs(covs, yaw_vars[:, 0]) @ gains.transpose(0, 2, 1)
+    steady = _steady_shares(now, along, begin)[station]
+    random = gains @ seen.covs(covs, yaw_vars[:, 0], steady) @ gains.transpose(0, 2, 1)
     return _directions(now, across, np.add.reduceat(random, begin[:-1]), gains @ seen.turned, packed, begin)
 
 
@@ -131,9 +132,12 @@ class _Seen:
         outward = axes[:, :, 0] * x + axes[:, :, 1] * y
         self.apart = across + error[:, None] * self.level - np.expand_dims(longer, 1) * outward
 
-    def covs(self, covs: Array, yaw_vars: Array) -> Array:
-        """Covariances (n, 2, 2) of readings: what is of a yaw (rad^2) moves the direction and not what was read."""
-        here = self.level[:, :, None] * self.level[:, None]
+    def covs(self, covs: Array, yaw_vars: Array, steady: Array | float = 1.0) -> Array:
+        """Covariances (n, 2, 2) of readings: what is of a yaw (rad^2) moves the direction and not what was read.
+
+        ``steady`` (n,) is the part of the squared lean of the direction that is not noise.
+        """
+        here = np.expand_dims(steady, (-2, -1)) * (self.level[:, :, None] * self.level[:, None])
         there = self._there[:, :, None] * self._there[:, None]
         return self.turned @ covs @ self.turned.transpose(0, 2, 1) + yaw_vars[:, None, None] * (here - there)
 
@@ -143,6 +147,16 @@ def _first_directions(tangents: Array, totals: Array, begin: Places) -> Array:
     sizes = np.trace(totals, axis1=1, axis2=2)
     first = [int(a + np.argmin(sizes[a:b])) for a, b in zip(begin[:-1].tolist(), begin[1:].tolist(), strict=True)]
     return tangents[first]
+
+
+def _steady_shares(now: Array, along: Array, begin: Places) -> Array:
+    """What of the squared leans (k,) of directions is not noise; ``along`` (n,) rad^2 is that of the inclinations read.
+
+    A yaw turns the true lean. That which was found is longer by the noise, its square by two variances in the mean.
+    """
+    squares = now[:, 0] ** 2 + now[:, 1] ** 2
+    noise = 1.0 / np.add.reduceat(1.0 / np.maximum(along, TINY), begin[:-1])
+    return np.asarray(squares / (squares + 2.0 * noise))
 
 
 def _solved(seen: _Seen, covs: Array, begin: Places) -> tuple[Array, Array]:

@@ -16,7 +16,9 @@ from groundstation.errors import SurveyError
 from groundstation.survey.files.field_files import read_any
 from groundstation.survey.files.field_table import TableWish
 from groundstation.survey.path.leg_wander import LegWander
+from groundstation.survey.path.stated_curvature import STATED_CURVATURE_DEG
 from groundstation.survey.requests.clearance_request import ClearanceRequest
+from groundstation.survey.requests.finite_figures import check_figures
 from groundstation.survey.requests.site_place import known_site
 from groundstation.survey.requests.survey_answer import magnetic_needs
 from groundstation.survey.requests.survey_request import FrameRequest
@@ -29,7 +31,6 @@ from groundstation.survey.well.reference_frames import SAME_DEPTH
 from groundstation.survey.well.well_record import SurveyRecord
 
 Array = npt.NDArray[np.float64]
-RELAY_CURVATURE_DEG = 0.3  # deg/m, as a ground station has it while it drills
 SAME_PLACE = 0.1  # m, of two records of one hole
 
 
@@ -55,6 +56,7 @@ def answer_clearance(request: ClearanceRequest) -> dict[str, Any]:
     SurveyError, ToolError
         When a record or an instrument cannot be used.
     """
+    check_figures(request)
     serial = "one" if request.same_instrument else ""
     mine = _Described(
         str(request.reference), _record(request.reference, request.hole), request.instrument, np.zeros(3),
@@ -100,7 +102,7 @@ def _wander(request: ClearanceRequest, instrument: str) -> LegWander:
     """Curvature of a path that an instrument surveyed."""
     std = request.curvature_sigma_deg_per_m
     if std is None:
-        std = RELAY_CURVATURE_DEG if instrument == "relay" else 0.0
+        std = STATED_CURVATURE_DEG if instrument == "relay" else 0.0
     return LegWander(math.radians(std), request.curvature_length_m)
 
 

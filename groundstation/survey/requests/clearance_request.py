@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from groundstation.survey.path.stated_curvature import STATED_LENGTH
 from groundstation.survey.requests.survey_request import SiteFigures
 
 
@@ -27,5 +28,5 @@ class ClearanceRequest:
     sigma_ahead_m: float = 0.5
     margin_m: float = 0.3
     curvature_sigma_deg_per_m: float | None = None  # of the paths between stations; see ``answer_clearance``
-    curvature_length_m: float = 20.0  # over which it is forgotten
+    curvature_length_m: float = STATED_LENGTH  # over which it is forgotten
     site: SiteFigures = field(default_factory=SiteFigures)

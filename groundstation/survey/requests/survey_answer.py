@@ -17,6 +17,7 @@ from groundstation.survey.files.field_table import TableWish
 from groundstation.survey.files.programme import read_programme, read_tie_on
 from groundstation.survey.files.station_tables import Understood
 from groundstation.survey.files.survey_records import DisplacementRule, with_collar
+from groundstation.survey.requests.finite_figures import check_figures
 from groundstation.survey.requests.site_place import MAGNETIC, known_site
 from groundstation.survey.requests.survey_request import PROGRAMME_ALONE, FrameRequest, SurveyRequest
 from groundstation.survey.requests.survey_rows import source_rows, station_at_depth, station_rows
@@ -110,6 +111,7 @@ def check_request(request: SurveyRequest) -> None:
     SurveyError
         Naming the options of the command.
     """
+    check_figures(request)
     if request.from_collar and request.tie_on is not None:
         raise SurveyError("expected --from-collar or --tie-on, got both")
     if request.programme is not None and request.azimuth_error_deg is not None:

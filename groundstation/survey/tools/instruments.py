@@ -10,7 +10,6 @@ their value beyond it (``gyro_modes``). Source: ISCWSA error model definition; S
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -27,6 +26,7 @@ from groundstation.survey.tools.formulas import (
     is_zero,
     normalise_name,
 )
+from telemetry.toml_tables import parse_toml_tables
 
 Triple = tuple[str, str, str]
 LARGEST = 1e300
@@ -195,8 +195,8 @@ def _read_tool(name_or_file: str, parameters: Mapping[str, float] | None) -> Sur
 def parse_toml(text: str, where: str, replaced: Mapping[str, float] | None = None) -> SurveyTool:
     """Tool of TOML text; errors as ``load_tool``, beginning with ``where``."""
     try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
+        data = parse_toml_tables(text)
+    except ValueError as error:
         raise ToolError(f"{where}: not TOML: {error}") from error
     _keys(where, "", data, {"tool", "parameters", "term"}, {"tool", "term"})
     head = data["tool"]

@@ -44,11 +44,13 @@ from groundstation.survey.wall.wall_tables import STRAIGHT, Defaults, Remedy, re
 from groundstation.survey.well.depth_reference import DEPTHS_FROM
 from groundstation.survey.well.methods import Method
 from groundstation.survey.well.reference_frames import SiteGrid
+from telemetry.toml_tables import parse_toml_tables
 
 if TYPE_CHECKING:
     from groundstation.plan_settings import PlanSettings
 
 Array = npt.NDArray[np.float64]
+SAME_PLACE = 1e-3  # m, within which two designs are one
 LAYOUTS = ("line", "shaft", "grid")
 NEEDED = ("radius_m", "thickness_m", "heads", "stations")
 NAMED = ("project", "client", "calibration", "height_datum")  # of the report alone
@@ -178,7 +180,7 @@ def read_wall_file(path: Path) -> WallFile:
         One line: file, key, what was expected and what came.
     """
     try:
-        data = tomllib.loads(path.read_text("utf-8"))
+        data = parse_toml_tables(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise SurveyError(f"{path}: {reason}; expected a wall file") from error
@@ -293,6 +295,8 @@ def read_wall(path: Path) -> Wall:
     """The whole wall; errors as ``read_wall_file``, of its CSV files with their line."""
     file = read_wall_file(path)
     rows = read_heads(file.heads, file.defaults)
+    if not rows:
+        raise SurveyError(f"{file.heads}: expected at least two columns next to each other, got none")
     courses = dict.fromkeys([*file.courses, *(row.course for row in rows if row.course is not None)])
     file = replace(file, courses=tuple(courses))
     names = [row.name for row in rows]
@@ -352,6 +356,15 @@ def _detours(path: Path, names: list[str], remedies: list[Remedy], pairs: npt.ND
     return found
 
 
+def _check_apart(path: Path, columns: Columns) -> None:
+    """Refuse two columns of the design that are one: the second closes nothing. A remedial one may stand in for it."""
+    shown: dict[bytes, str] = {}
+    for name, planned in zip(columns.names, columns.planned, strict=True):
+        other = shown.setdefault(np.round(planned / SAME_PLACE).tobytes(), name)
+        if other != name:
+            raise SurveyError(f"{path}: columns {other} and {name} are one by their design; expected them apart")
+
+
 def _check_design(
     file: WallFile, plans: list[ColumnPlan], built: BuiltWall, pairs: npt.NDArray[np.intp], helped: set[int]
 ) -> None:
@@ -360,6 +373,7 @@ def _check_design(
     ``helped`` : joints that have a way by remedial columns, whose own designs need not reach
     """
     columns = built.columns
+    _check_apart(file.path, columns.subset(np.unique(pairs)))
     alone = pairs[[j for j in range(len(pairs)) if j not in helped]]
     designs = [plan.design for plan in plans]
     try:

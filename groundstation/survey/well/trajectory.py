@@ -17,42 +17,31 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from operator import attrgetter, itemgetter
+from operator import itemgetter
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import add_shared_errors
-from groundstation.survey.fusion.sphere_direction import tangent_errors
-from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
+from groundstation.survey.fusion.tangents import tangents_of
 from groundstation.survey.path.leg_wander import STEADY, LegWander
 from groundstation.survey.well.arcs import on_arc
 from groundstation.survey.well.depth_errors import EXACT, StationDepth
 from groundstation.survey.well.methods import Method
 from groundstation.survey.well.trajectory_legs import check_bends, leg_displacements
 from groundstation.survey.well.trajectory_rows import (
-    FEWEST,
-    GROWTH,
-    ROW,
-    Followed,
     TrajectoryPoint,
     TrajectorySums,
     across_of,
-    runs_of,
 )
+from groundstation.survey.well.trajectory_stations import BLOCK, TrajectoryStations
 
 Array = npt.NDArray[np.float64]
-BLOCK = 64  # stations from mark to mark
-PLACES, VALUES = map(attrgetter, ("places", "values"))
-DEPTH_PLACES, DEPTH_VALUES = map(attrgetter, ("columns.places", "columns.values"))
-NONE: Final = Packed(np.zeros((2, 0)))
 UNKNOWN: Final = np.zeros((3, 0))
 NOTHING: Final = np.zeros(0)
-FROM_ZERO: Final = np.zeros(1, np.intp)
 ALL_EXACT: Final[Mapping[float, StationDepth]] = {}
 TURNED_BACK = math.cos(math.radians(120.0))  # of the bend of one leg, beyond which it is no hole any more
 
@@ -83,24 +72,20 @@ class Trajectory:
         self._driven = NOTHING  # (s,), variance by which each leg is driven over that of the curvature; 1 of the others
         self._keeps_columns = keeps_columns
         first = collar or Direction(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
-        self._rows = np.zeros(FEWEST, ROW)
-        self._directions: list[Direction] = []  # of the collar and every station
-        self._columns: list[Packed] = []  # (2, s), of each
-        self._down: list[Array] = []  # and what those come to in the vertical, (c,) of those that are kept
-        self._depths: list[StationDepth] = []
-        self._insert(0, start_md, first)
-        self._direct([0])
+        self._stations = TrajectoryStations()
+        self._stations.insert(0, start_md, first)
+        self._stations.direct([0])
         self._kept = [UNKNOWN]  # shared columns of every point that is drawn
         self._sums = TrajectorySums(np.zeros((3, 3)), np.zeros((3, 0)), 0.0)
         self._marks = [self._sums]  # at the collar and every BLOCK stations from there
 
     def __len__(self) -> int:
         """Number of points."""
-        return len(self._directions)
+        return len(self._stations.directions)
 
     def __getitem__(self, place: int) -> TrajectoryPoint:
         place = range(len(self))[place]
-        row = self._rows[place]
+        row = self._stations.rows[place]
         return TrajectoryPoint(
             float(row["md"]), row["tangent"].copy(), row["position"].copy(), row["cov"].copy(), self._kept[place]
         )
@@ -113,44 +98,44 @@ class Trajectory:
     @property
     def md(self) -> Array:
         """Depths (n,) of the points, m."""
-        return np.asarray(self._rows["md"][: len(self._directions)])
+        return np.asarray(self._stations.rows["md"][: len(self._stations.directions)])
 
     @property
     def tangent_covs(self) -> Array:
         """Covariances (n, 3, 3) of the directions, of each the part that no other shares."""
-        return np.asarray(self._rows["own"][: len(self._directions)])
+        return np.asarray(self._stations.rows["own"][: len(self._stations.directions)])
 
     @property
     def positions(self) -> Array:
         """Positions (n, 3) of the points, m."""
-        return np.asarray(self._rows["position"][: len(self._directions)])
+        return np.asarray(self._stations.rows["position"][: len(self._stations.directions)])
 
     @property
     def tangents(self) -> Array:
         """Tangents (n, 3) at the points."""
-        return np.asarray(self._rows["tangent"][: len(self._directions)])
+        return np.asarray(self._stations.rows["tangent"][: len(self._stations.directions)])
 
     @property
     def covs(self) -> Array:
         """Covariances (n, 3, 3) of the positions, m^2."""
-        return np.asarray(self._rows["cov"][: len(self._directions)])
+        return np.asarray(self._stations.rows["cov"][: len(self._stations.directions)])
 
     @property
     def path_covs(self) -> Array:
         """Covariances (n, 3, 3), m^2, that the path between the stations makes of ``covs``."""
-        return np.asarray(self._rows["path"][: len(self._directions)])
+        return np.asarray(self._stations.rows["path"][: len(self._stations.directions)])
 
     @property
     def depth_covs(self) -> Array:
         """Covariances (n, 3, 3), m^2, that the own errors of depths make of ``covs``; what they share has columns."""
-        rows = self._rows[: len(self)]
+        rows = self._stations.rows[: len(self._stations.directions)]
         along = rows["along"]
         return np.asarray(rows["kinks"] + rows["depth_var"][:, None, None] * (along[:, :, None] * along[:, None]))
 
     @property
     def turned_back(self) -> list[float]:
         """Depths (m) of the stations that point back against the one above: the hole is not what is drawn there."""
-        tangents = self._rows["tangent"][: len(self)]
+        tangents = self._stations.rows["tangent"][: len(self._stations.directions)]
         return [float(md) for md in self.md[1:][(tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK]]
 
     def append(self, md: float, direction: Direction, depth: StationDepth = EXACT) -> TrajectoryPoint:
@@ -179,16 +164,15 @@ class Trajectory:
         SurveyError
             When a depth does not grow, or two directions are opposite; then none is added.
         """
-        mds = [float(self._rows["md"][len(self) - 1]), *(md for md, _ in stations)]
+        mds = [float(self._stations.rows["md"][len(self) - 1]), *(md for md, _ in stations)]
         for before, md in itertools.pairwise(mds):
             if not 0.0 < md - before < math.inf:
                 raise SurveyError(f"trajectory: expected a depth beyond {before:g} m, got {md:g} m")
-        check_bends(self.method, mds, tangents_of([self._directions[-1], *(direction for _, direction in stations)]))
+        directions = [self._stations.directions[-1], *(direction for _, direction in stations)]
+        check_bends(self.method, mds, tangents_of(directions))
         known = len(self)
-        for place, (md, direction) in enumerate(stations, known):
-            self._insert(place, md, direction)
-            self._depths[place] = depths.get(md, EXACT)
-        self._direct(range(known, len(self)))
+        self._stations.append_all(stations, depths)
+        self._stations.direct(range(known, len(self)))
         self._draw(known)
 
     def put(
@@ -208,21 +192,24 @@ class Trajectory:
         SurveyError
             When a depth is not below the first; then none is put.
         """
-        changed, collar = [], float(self._rows["md"][0])
+        changed, collar, known = list[int](), float(self._stations.rows["md"][0]), len(self._stations.directions)
         stations = sorted(stations, key=itemgetter(0))
         for md, _ in stations:
             if not collar < md < math.inf:
                 raise SurveyError(f"trajectory: expected a depth beyond {collar:g} m, got {md:g} m")
+        if stations and stations[0][0] > self._stations.rows["md"][known - 1]:
+            self._stations.append_all(stations, depths)
+            changed, stations = list(range(known, len(self))), []
         for md, direction in stations:
             place = int(np.searchsorted(self.md, md))
-            if place == len(self._directions) or self._rows["md"][place] != md:
-                self._insert(place, md, direction)
-            elif self._directions[place] is direction:
+            if place == len(self._stations.directions) or self._stations.rows["md"][place] != md:
+                self._stations.insert(place, md, direction)
+            elif self._stations.directions[place] is direction:
                 continue
-            self._directions[place] = direction
-            self._depths[place] = depths.get(md, self._depths[place])
+            self._stations.directions[place] = direction
+            self._stations.depths[place] = depths.get(md, self._stations.depths[place])
             changed.append(place)
-        self._direct(changed)
+        self._stations.direct(changed)
         if changed:
             self._draw(changed[0])
 
@@ -242,6 +229,11 @@ class Trajectory:
         found[: len(driven), [0, 2]] *= driven[:, None]  # of itself, and of it with the curvature at its end
         return found
 
+    @property
+    def shared_depth_vars(self) -> Array:
+        """Variances (n, 3) of the positions by what their depths share, m^2."""
+        return self._stations.shared_depth_vars()
+
     def at(self, md: float) -> TrajectoryPoint:
         """Point at a depth (m): on the arc between two stations, with its own covariance.
 
@@ -253,15 +245,15 @@ class Trajectory:
         SurveyError
             When ``md`` is outside the trajectory.
         """
-        first, last = float(self._rows["md"][0]), float(self._rows["md"][len(self) - 1])
+        first, last = float(self._stations.rows["md"][0]), float(self._stations.rows["md"][len(self) - 1])
         if not first <= md <= last:
             raise SurveyError(f"trajectory: expected a depth of {first:g}..{last:g} m, got {md:g} m")
         place = int(np.searchsorted(self.md, md))
-        return self[place] if self._rows["md"][place] == md else self._between(place - 1, md)
+        return self[place] if self._stations.rows["md"][place] == md else self._between(place - 1, md)
 
     def _between(self, k: int, md: float) -> TrajectoryPoint:
         """Point between the station at a place and the next."""
-        upper, lower = self._rows[k], self._rows[k + 1]
+        upper, lower = self._stations.rows[k], self._stations.rows[k + 1]
         leg = float(lower["md"] - upper["md"])
         f = (md - float(upper["md"])) / leg
         place, tangent = on_arc(upper["tangent"], lower["tangent"], lower["position"] - upper["position"], leg, f)
@@ -276,59 +268,21 @@ class Trajectory:
         cov = cov + self._wander.grown(float(upper["memory"]), moment) * across_of(along)
         for row, own, weight, moved in zip((upper, lower), (k, k + 1), weights, by_depth, strict=True):
             cov = cov + weight**2 * row["own"] + float(row["depth_var"]) * np.outer(moved, moved)
-            shared = add_shared_errors(shared, weight * self._tangent_columns(own))
-            shared = add_shared_errors(shared, moved[:, None] * self._depths[own].columns.columns())
+            shared = add_shared_errors(shared, weight * self._stations.tangent_columns(own))
+            shared = add_shared_errors(shared, moved[:, None] * self._stations.depths[own].columns.columns())
         return TrajectoryPoint(md, tangent, upper["position"] + place, cov + shared @ shared.T, shared)
 
     def _sums_at(self, place: int) -> TrajectorySums:
         """Running sums at a station."""
         begin = place - place % BLOCK
         mark = self._marks[begin // BLOCK]
-        return mark if begin == place else self._follow(mark, begin, place, with_columns=False).sums
-
-    def _tangent_columns(self, place: int) -> Array:
-        """Shared columns (3, s) of the tangent at a station."""
-        packed = self._columns[place]
-        values = np.concatenate([packed.values, self._down[place][None]])
-        return Packed.of_values(values, packed.places, packed.width).columns()
+        return mark if begin == place else self._stations.follow(mark, begin, place, with_columns=False).sums
 
     def columns(self) -> Iterator[Array]:
         """Shared columns (n, 3, s) of the points from the collar down, some at a time, as many as were known there."""
         yield UNKNOWN[None]
         for begin, mark in zip(range(0, len(self) - 1, BLOCK), self._marks, strict=False):
-            yield from self._follow(mark, begin, min(begin + BLOCK, len(self) - 1), with_columns=True).runs
-
-    def _insert(self, place: int, md: float, direction: Direction) -> None:
-        """Insert a row for a station; what follows from its direction is not in it yet."""
-        known, count = self._rows, len(self._directions)
-        if count == len(known):
-            self._rows = np.zeros(count + 1 + count // GROWTH, ROW)
-            self._rows[:count] = known
-        self._rows[place + 1 : count + 1] = self._rows[place:count]
-        self._rows["md"][place] = md
-        self._directions.insert(place, direction)
-        self._columns.insert(place, NONE)
-        self._down.insert(place, NOTHING)
-        self._depths.insert(place, EXACT)
-
-    def _direct(self, places: Sequence[int]) -> None:
-        """Compute the rows at some places that depend on their own direction alone."""
-        if not places:
-            return
-        directions = [*map(self._directions.__getitem__, places)]
-        tangents = tangents_of(directions)
-        jacobians = tangent_jacobians(tangents)
-        counts, own_vars = [], []
-        rows, at = self._rows, np.array(places)
-        for place, direction, jacobian in zip(places, directions, jacobians, strict=True):
-            own, columns, self._down[place] = tangent_errors(direction, jacobian)
-            rows["own"][place], self._columns[place], depth = own, columns, self._depths[place]
-            width = max(columns.width, depth.columns.width)
-            counts.append((width, len(columns.places), len(depth.columns.places)))
-            own_vars.append(depth.own_var)
-        rows["tangent"][at] = tangents
-        rows["width"][at], rows["count"][at], rows["depths"][at] = np.array(counts).T
-        rows["depth_var"][at] = own_vars
+            yield from self._stations.follow(mark, begin, min(begin + BLOCK, len(self) - 1), with_columns=True).runs
 
     def _draw(self, first: int) -> None:
         """Compute the positions from a place on."""
@@ -337,12 +291,12 @@ class Trajectory:
             begin -= begin % BLOCK
             del self._kept[begin + 1 :], self._marks[begin // BLOCK + 1 :]
             self._sums = self._marks[-1]
-        end = len(self._directions)
-        rows = self._rows[begin:end]
+        end = len(self._stations.directions)
+        rows = self._stations.rows[begin:end]
         legs = leg_displacements(self.method, rows["md"], rows["tangent"])
         rows["position"] = np.add.accumulate(np.concatenate([rows["position"][:1], legs]))
         more = self._go_along(begin, rows, legs)
-        followed = self._follow(self._sums, begin, end - 1, with_columns=self._keeps_columns)
+        followed = self._stations.follow(self._sums, begin, end - 1, with_columns=self._keeps_columns)
         rows["cov"][1:] = followed.covs + more
         self._sums = followed.sums
         self._marks += followed.marks
@@ -366,51 +320,3 @@ class Trajectory:
         )  # fmt: skip
         rows["along"], rows["memory"], rows["kinks"], rows["path"] = alongs, memories, kinks, path
         return more
-
-    def _follow(self, sums: TrajectorySums, begin: int, end: int, *, with_columns: bool) -> Followed:
-        """Continue ``sums`` from one place to another."""
-        from groundstation.survey.well.kernels.position_errors import (
-            add_stations,  # reading alone needs no compiler
-        )
-
-        rows, columns = self._rows[begin : end + 1], self._columns[begin : end + 1]
-        depths = self._depths[begin : end + 1]
-        known = max(sums.passed.shape[1], int(rows["width"][0]))
-        widths = np.maximum(np.maximum.accumulate(rows["width"][1:]), known)
-        starts = np.concatenate([FROM_ZERO, rows["count"].cumsum()])
-        places = np.concatenate([*map(PLACES, columns)]).astype(np.intp, copy=False)
-        lean, down = (
-            np.concatenate([*map(VALUES, columns)], axis=1),
-            np.concatenate(self._down[begin : end + 1]),
-        )
-        depth_starts = np.concatenate([FROM_ZERO, rows["depths"].cumsum()])
-        depth_places = np.concatenate([*map(DEPTH_PLACES, depths)]).astype(np.intp, copy=False)
-        by_depth = np.concatenate([*map(DEPTH_VALUES, depths)], axis=1)[0]
-        alongs = rows["along"][1:].copy()
-        legs = np.diff(rows["md"])
-        ends = 0.5 * legs
-        weights = ends.copy()  # of the station before each, which has both its legs now
-        weights[0] += 0.5 * sums.length
-        weights[1:] += ends[:-1]
-        width, count = int(widths[-1]), len(ends)
-        marked = np.arange(BLOCK - begin % BLOCK, count + 1, BLOCK) - 1
-        marks, own_marks = np.empty((len(marked), 3, width)), np.empty((len(marked), 3, 3))
-        passed, own = np.zeros((3, width)), sums.own.copy()
-        passed[:, : sums.passed.shape[1]] = sums.passed
-        shared, covs = np.empty((count if with_columns else 0, 3, width)), np.empty((count, 3, 3))
-        add_stations(
-            weights, ends, starts, places, lean, down, rows["own"].copy(), rows["along"][:-1] - alongs, alongs,
-            depth_starts, depth_places, by_depth, widths, passed, np.empty_like(passed), own,
-            int(marked[0]) if len(marked) else count, BLOCK, marks, own_marks, shared, covs,
-        )  # fmt: skip
-        return Followed(
-            TrajectorySums(own, passed, float(legs[-1])),
-            [
-                TrajectorySums(own_marks[number].copy(), marks[number, :, : int(widths[k])].copy(), float(legs[k]))
-                for number, k in enumerate(marked.tolist())
-            ]
-            if len(marked)
-            else [],
-            runs_of(shared, widths) if with_columns else [],
-            covs,
-        )

@@ -1,17 +1,21 @@
-"""A source by its name on the command line: ``replay:FILE``, ``timed:FILE``, ``mpu6500:1``, ``counter:FILE``."""
+"""A source by its name on the command line, as ``timed:FILE``, ``iio:icm42688``, ``mpu6500:1``, ``counter:FILE``."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from node.errors import NodeConfigurationError
+from node.process.drivers.iio_imu import IioImu
 from node.process.drivers.mpu6500 import ADDRESS, Mpu6500, open_bus
 from node.process.drivers.quadrature import QuadratureFile
 from node.process.drivers.replay_drivers import ReplayEncoder, ReplayImu
 from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.drivers.timed import TimedEncoder, TimedImu
+from node.process.drivers.vn100 import Vn100
+from telemetry.errors import RecordError
+from telemetry.records.record_reading import RecordReading, read_told
 
-IMU_FORMS = "replay:FILE, timed:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS"
+IMU_FORMS = "replay:FILE, timed:FILE, iio:NAME, vn100:DEVICE, mpu6500:BUS or mpu6500:BUS:ADDRESS"
 COUNTER_FORMS = "replay:FILE, timed:FILE or counter:FILE"
 LARGEST_BUS = 255
 ADDRESSES = (0x68, 0x69)
@@ -27,9 +31,13 @@ def imu_source(text: str) -> ImuSource:
     """
     kind, _, rest = text.partition(":")
     if kind == "replay" and rest:
-        return ReplayImu(recording_path("imu", rest))
+        return ReplayImu(*told_recording("imu", rest))
     if kind == "timed" and rest:
-        return TimedImu(recording_path("imu", rest))
+        return TimedImu(*told_recording("imu", rest))
+    if kind == "iio" and rest:
+        return IioImu(rest)
+    if kind == "vn100" and rest:
+        return Vn100(Path(rest))
     if kind == "mpu6500":
         bus, _, address = rest.partition(":")
         try:
@@ -57,6 +65,21 @@ def encoder_source(text: str) -> EncoderSource:
     if kind == "counter" and rest:
         return QuadratureFile(Path(rest))
     raise NodeConfigurationError(f"counter: expected {COUNTER_FORMS}, got {text!r}")
+
+
+def told_recording(option: str, text: str) -> tuple[Path, RecordReading]:
+    """File of a recording and what is told of it.
+
+    Raises
+    ------
+    ConfigurationError
+        When there is none of that name, or what is told cannot be read.
+    """
+    try:
+        path, reading = read_told(text)
+    except RecordError as error:
+        raise NodeConfigurationError(f"{option}: {error}") from error
+    return recording_path(option, str(path)), reading
 
 
 def recording_path(option: str, name: str) -> Path:

@@ -1,9 +1,10 @@
-"""Recordings as sources, one row a cycle. The end of a recording and a row without numbers are sensor faults.
+"""Recordings as sources. The end of a recording, a gap in it and a row without numbers are sensor faults.
 
-IMU: ``time, wx, wy, wz, fx, fy, fz`` and, if it was recorded, ``temperature``; s, rad/s, m/s^2, C.
+IMU: any record that ``telemetry.records`` reads. One whose rows are cycles plays one row a cycle, whatever the clock
+says; one of a faster sensor plays the mean of the rows of each cycle, by its own times, which begin with the first
+cycle.
 Encoder: ``time, count, edge_at, rising`` and, if they were taken, the times of the edges before the last in its
 direction, newest first; s, counts, s, 1 or 0, s. A row that has fewer of them repeats the oldest.
-A ``.npy`` file holds the same columns as an array of float64; a ``.csv`` file may begin with one line of names.
 """
 
 from __future__ import annotations
@@ -17,50 +18,45 @@ import numpy.typing as npt
 from node.errors import SensorError
 from node.firmware.edge_interpolation import EDGES
 from node.firmware.encoder_node import EncoderSample
-from node.kernels.sensors.correction import USUAL
+from node.process.drivers.recorded_imu import RecordedMeans, load_record
 from node.process.drivers.source import ImuSample
+from telemetry.records.record_reading import RecordReading
 
 Rows = npt.NDArray[np.float64]
-IMU_COLUMNS = (7, 8)
 ENCODER_COLUMNS = tuple(range(4, 4 + EDGES))
 FARTHEST = 1e15  # of a count
+A_CYCLE = 0.5  # of a cycle: rows that are closer are a sensor's samples, and are averaged
 
 
 class ReplayImu:
-    """Plays a recording of an IMU, one row a cycle, whatever the clock says."""
+    """Plays a recording of an IMU from its first row on, when it was started."""
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._rows: Rows | None = None
+    def __init__(self, path: Path, reading: RecordReading | None = None) -> None:
+        self._path, self._reading = path, reading or RecordReading()
+        self._means: RecordedMeans | None = None
         self._next = 0
+        self._shift: float | None = None
+        self.understood = ""
 
     def start(self) -> None:
         """Read the file on the first start; later starts continue after the row that failed."""
-        if self._rows is None:
-            self._rows = load_rows(self._path, IMU_COLUMNS)
+        if self._means is None:
+            record = load_record(self._path, self._reading)
+            self._means, self.understood = RecordedMeans(record), record.understood
 
     def read(self, begin: float, end: float) -> ImuSample:
-        """The next row."""
-        row = self._take()
-        return ImuSample(
-            (float(row[1]), float(row[2]), float(row[3])),
-            (float(row[4]), float(row[5]), float(row[6])),
-            float(row[7]) if len(row) > 7 else USUAL,
-        )
+        """The next row, or the mean of the next cycle of a faster record."""
+        if self._means is None:
+            raise SensorError(f"{self._path}: not started")
+        if self._means.period < A_CYCLE * (end - begin):
+            if self._shift is None:
+                self._shift = self._means.first - begin
+            return self._means.mean(begin + self._shift, end + self._shift)
+        k, self._next = self._next, self._next + 1
+        return self._means.row(k)
 
     def close(self) -> None:
         """Nothing to release."""
-
-    def _take(self) -> Rows:
-        if self._rows is None:
-            raise SensorError(f"{self._path}: not started")
-        if self._next >= len(self._rows):
-            raise SensorError(f"{self._path}: the recording of {len(self._rows)} cycles has ended")
-        row = self._rows[self._next]
-        self._next += 1
-        if not np.all(np.isfinite(row)):
-            raise SensorError(f"{self._path}: row {self._next}: expected finite numbers")
-        return np.asarray(row)
 
 
 class ReplayEncoder:
@@ -95,7 +91,7 @@ class ReplayEncoder:
 
 
 def load_rows(path: Path, columns: tuple[int, ...]) -> Rows:
-    """Rows of a recording.
+    """Rows of a counter's recording: a ``.npy`` array, or a ``.csv`` that may begin with one line of names.
 
     Raises
     ------

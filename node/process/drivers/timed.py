@@ -1,9 +1,4 @@
-"""Recordings played by the clock: a read returns what was recorded at that time.
-
-The columns are those of ``drivers.replay``; the times are those of the node's own clock, in ascending order. A row of
-an IMU is the mean since the row before, so the mean over any cycle follows from the running integral, and neither the
-rate of the rows nor a late cycle loses any turning.
-"""
+"""Recordings played by the clock: a read returns what was recorded at that time, on the node's own clock."""
 
 from __future__ import annotations
 
@@ -13,46 +8,34 @@ import numpy as np
 
 from node.errors import SensorError
 from node.firmware.encoder_node import EncoderSample
-from node.kernels.sensors.correction import USUAL
-from node.process.drivers.replay_drivers import ENCODER_COLUMNS, IMU_COLUMNS, Rows, load_rows
+from node.process.drivers.recorded_imu import RecordedMeans, load_record, outside_recording_text
+from node.process.drivers.replay_drivers import ENCODER_COLUMNS, Rows, load_rows
 from node.process.drivers.source import ImuSample
+from telemetry.records.record_reading import RecordReading
 
 
 class TimedImu:
     """An IMU's recording by the clock."""
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._times: Rows | None = None
-        self._integral: Rows | None = None
+    def __init__(self, path: Path, reading: RecordReading | None = None) -> None:
+        self._path, self._reading = path, reading or RecordReading()
+        self._means: RecordedMeans | None = None
+        self.understood = ""
 
     def start(self) -> None:
         """Read the file on the first start."""
-        if self._integral is not None:
-            return
-        rows = load_times(self._path, IMU_COLUMNS)
-        lengths = np.diff(rows[:, 0])
-        self._times = rows[:, 0].copy()
-        self._integral = np.zeros((len(rows), rows.shape[1] - 1))
-        np.cumsum(rows[1:, 1:] * lengths[:, None], axis=0, out=self._integral[1:])
+        if self._means is None:
+            record = load_record(self._path, self._reading)
+            self._means, self.understood = RecordedMeans(record), record.understood
 
     def read(self, begin: float, end: float) -> ImuSample:
         """Mean from ``begin`` to ``end`` (s, own clock)."""
-        wx, wy, wz, fx, fy, fz, *rest = ((self._at(end) - self._at(begin)) / (end - begin)).tolist()
-        return ImuSample((wx, wy, wz), (fx, fy, fz), rest[0] if rest else USUAL)
+        if self._means is None:
+            raise SensorError(f"{self._path}: not started")
+        return self._means.mean(begin, end)
 
     def close(self) -> None:
         """Nothing to release."""
-
-    def _at(self, t: float) -> Rows:
-        if self._times is None or self._integral is None:
-            raise SensorError(f"{self._path}: not started")
-        k = int(np.searchsorted(self._times, t, side="right"))
-        if not 0 < k < len(self._times):
-            raise SensorError(outside_recording_text(self._path, self._times, t))
-        before, after = self._times[k - 1], self._times[k]
-        share = (t - before) / (after - before)
-        return np.asarray((1.0 - share) * self._integral[k - 1] + share * self._integral[k])
 
 
 class TimedEncoder:
@@ -82,7 +65,7 @@ class TimedEncoder:
 
 
 def load_times(path: Path, columns: tuple[int, ...]) -> Rows:
-    """Rows of a recording whose times can be searched.
+    """Rows of a counter's recording whose times can be searched.
 
     Raises
     ------
@@ -97,8 +80,3 @@ def load_times(path: Path, columns: tuple[int, ...]) -> Rows:
         where = f"row {2 + int(np.argmin(steps > 0.0))}" if len(rows) > 1 else "row 2"
         raise SensorError(f"{path}: {where}: expected a time after that of the row before")
     return rows
-
-
-def outside_recording_text(path: Path, times: Rows, t: float) -> str:
-    """Error text for a time outside the recording."""
-    return f"{path}: recorded from {times[0]:.1f} s to {times[-1]:.1f} s, asked for {t:.1f} s"

@@ -11,13 +11,11 @@ from groundstation.calibration.allan_analysis import (
     allan_variance,
     analyse_allan_deviation,
     curve_factors,
-    filter_noise,
-    filter_noise_of,
     fit_factors,
-    gauss_markov_variance,
     relative_standard_error,
 )
 from groundstation.calibration.allan_fit import allan_design_matrix, fit_allan_variances, spectral_moments
+from groundstation.calibration.bias_model import filter_noise, gauss_markov_variance
 from sim.instruments.static_records import StaticNoise, static_record
 from telemetry.errors import CalibrationError
 
@@ -232,14 +230,6 @@ def test_gauss_markov_curve_has_its_peak_where_the_mapping_puts_it() -> None:
     assert taus[np.argmax(curve)] == pytest.approx(1.89, abs=0.005)
     assert curve[0] == pytest.approx(2.0 / 3.0 * taus[0], rel=0.01)  # a random walk of 2 / tau_c below it
     assert curve[-1] == pytest.approx(2.0 / taus[-1], rel=0.02)  # white above it
-
-
-def test_filter_noise_of_a_fit_meets_the_fitted_curve() -> None:
-    found = analyse_allan_deviation(record(MPU_X), RATE)[0].fit
-    noise = filter_noise_of(found, 60.0)
-    for tau in (1.0, 60.0):
-        ours = noise.white**2 / tau + noise.bias_std**2 * gauss_markov_variance(tau, noise.bias_tau)
-        assert ours == pytest.approx(found.random_walk.value**2 / tau + found.floor.value**2, rel=1e-9)
 
 
 @pytest.mark.parametrize(("at_1s", "at_floor", "tau"), [(1.0, 100.0, 30.0), (1.0, 0.1, 30.0), (1.0, 0.5, 1.0)])

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.calibration.calibration_records import read_attitudes, read_static, read_turn_table
+from groundstation.calibration.calibration_records import read_attitudes, read_turn_table
 from telemetry.errors import CalibrationError, InputError
 
 DATA = Path(__file__).parents[2] / "data" / "calibration"
@@ -28,21 +28,10 @@ def file(folder: Path, *lines: str, name: str = "bench.csv") -> Path:
 
 def refusal(path: Path, kind: str, **options: float) -> str:
     """Message with which a file is refused."""
-    readers = {"table": partial(read_turn_table, reference=100.0), "poses": read_attitudes, "static": read_static}
+    readers = {"table": partial(read_turn_table, reference=100.0), "poses": read_attitudes}
     with pytest.raises(CalibrationError) as refused:
         readers[kind](path, **options)
     return str(refused.value)
-
-
-def noise(count: int = 400, seed: int = 0) -> np.ndarray:
-    return np.array([0.0, 0.0, 9.81]) + 0.01 * np.random.default_rng(seed).normal(size=(count, 3))
-
-
-def static(folder: Path, samples: np.ndarray, npy: bool = False) -> Path:
-    if npy:
-        np.save(folder / "rest.npy", samples)
-        return folder / "rest.npy"
-    return file(folder, "# at rest", "x,y,z", *(",".join(map(repr, row)) for row in samples.tolist()), name="rest.csv")
 
 
 def test_the_error_is_one_of_the_ground_station_and_a_value_error() -> None:
@@ -76,17 +65,6 @@ def test_the_published_records_are_read() -> None:
     assert read_turn_table(DATA / "calibration_node_a1_gyro.csv", 720.0, limit=1000.0).positive[0, 1] == 14.49795449
 
 
-@pytest.mark.parametrize("npy", [False, True])
-def test_a_static_record_and_its_mean(tmp_path: Path, npy: bool) -> None:
-    samples = noise()
-    path = static(tmp_path, samples, npy)
-    record = read_static(path, unit=2.0, limit=20.0, size=9.81)
-    np.testing.assert_array_equal(record.samples, 2.0 * samples)
-    np.testing.assert_allclose(record.mean(), 2.0 * samples.mean(axis=0))
-    np.testing.assert_allclose(np.diag(record.mean_cov()), 4.0 * samples.var(axis=0, ddof=1) / 400.0)
-    assert record.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
-
-
 def test_a_file_of_another_system_is_read(tmp_path: Path) -> None:
     path = tmp_path / "bench.csv"
     path.write_bytes(b"\xef\xbb\xbf" + "\r\n".join([POS_NEG, *ROWS]).encode())
@@ -96,7 +74,7 @@ def test_a_file_of_another_system_is_read(tmp_path: Path) -> None:
 # What is wrong with a file whatever it holds.
 
 
-@pytest.mark.parametrize("kind", ["table", "poses", "static"])
+@pytest.mark.parametrize("kind", ["table", "poses"])
 @pytest.mark.parametrize("text", ["", " \n\n"])
 def test_an_empty_file(tmp_path: Path, kind: str, text: str) -> None:
     path = tmp_path / "bench.csv"
@@ -104,15 +82,13 @@ def test_an_empty_file(tmp_path: Path, kind: str, text: str) -> None:
     assert refusal(path, kind) == "bench.csv, line 1: expected a record, got an empty file"
 
 
-@pytest.mark.parametrize("kind", ["table", "poses", "static"])
+@pytest.mark.parametrize("kind", ["table", "poses"])
 def test_a_file_that_is_not_there(tmp_path: Path, kind: str) -> None:
     message = refusal(tmp_path / "bench.csv", kind)
     assert message == "bench.csv: expected a file to read, got No such file or directory"
 
 
-@pytest.mark.parametrize(
-    ("kind", "expected"), [("table", f"{POS_NEG} or {CW_ACW}"), ("poses", ATTITUDES), ("static", "x,y,z")]
-)
+@pytest.mark.parametrize(("kind", "expected"), [("table", f"{POS_NEG} or {CW_ACW}"), ("poses", ATTITUDES)])
 @pytest.mark.parametrize("header", ["axis,x,y,z", "x,y", "position,pitch_rad,roll_rad,ax_mps2,ay_mps2,az_mps2"])
 def test_a_wrong_header(tmp_path: Path, kind: str, expected: str, header: str) -> None:
     message = refusal(file(tmp_path, "# bench", header, "1,2,3"), kind)
@@ -120,12 +96,12 @@ def test_a_wrong_header(tmp_path: Path, kind: str, expected: str, header: str) -
 
 
 def test_only_comments(tmp_path: Path) -> None:
-    message = refusal(file(tmp_path, "# nothing came"), "static")
-    assert message == "bench.csv, line 1: expected the header x,y,z, got only comments"
+    message = refusal(file(tmp_path, "# nothing came"), "poses")
+    assert message == f"bench.csv, line 1: expected the header {ATTITUDES}, got only comments"
 
 
 def test_a_header_alone(tmp_path: Path) -> None:
-    assert refusal(file(tmp_path, "#", "x,y,z"), "static") == (
+    assert refusal(file(tmp_path, "#", ATTITUDES), "poses") == (
         "bench.csv, line 2: expected rows below the header, got the end of the file"
     )
 
@@ -143,8 +119,6 @@ def test_no_number(tmp_path: Path, text: str) -> None:
     assert refusal(path, "table") == f"bench.csv, line 4: expected a number in column y_pos, got {text!r}"
     path = file(tmp_path, ATTITUDES, POSES[0], f"1,30,{text},4.9,0,8.5")
     assert refusal(path, "poses") == f"bench.csv, line 3: expected a number in column roll_deg, got {text!r}"
-    path = file(tmp_path, "x,y,z", "1,2,3", f"1,2,{text}")
-    assert refusal(path, "static") == f"bench.csv, line 3: expected a number in column z, got {text!r}"
 
 
 @pytest.mark.parametrize("text", ["nan", "NaN", "inf", "-inf", "1e999"])
@@ -153,14 +127,12 @@ def test_not_finite(tmp_path: Path, text: str) -> None:
     assert refusal(path, "table") == f"bench.csv, line 4: expected a finite number in column z_neg, got {text}"
     path = file(tmp_path, ATTITUDES, f"home,0,0,{text},0,9.81")
     assert refusal(path, "poses") == f"bench.csv, line 2: expected a finite number in column ax_mps2, got {text}"
-    path = file(tmp_path, "x,y,z", "1,2,3", "", f"1,{text},3")
-    assert refusal(path, "static") == f"bench.csv, line 4: expected a finite number in column y, got {text}"
 
 
 def test_bytes_that_are_no_text(tmp_path: Path) -> None:
     path = tmp_path / "bench.csv"
-    path.write_bytes(b"x,y,z\n1,2,\xff\n")
-    assert refusal(path, "static") == "bench.csv, line 2: expected UTF-8 text, got byte 0xff"
+    path.write_bytes(f"{ATTITUDES}\n1,2,".encode() + b"\xff\n")
+    assert refusal(path, "poses") == "bench.csv, line 2: expected UTF-8 text, got byte 0xff"
 
 
 # Turn table.
@@ -242,148 +214,3 @@ def test_a_saturated_accelerometer(tmp_path: Path) -> None:
     assert refusal(path, "poses", limit=9.81) == (
         "bench.csv, line 2: expected column az_mps2 inside the range of +-9.81, got 9.81: saturated"
     )
-
-
-# Static records; the CSV has two lines above its first sample, the array none.
-
-
-@pytest.mark.parametrize(("npy", "place"), [(False, "rest.csv, line 93"), (True, "rest.npy, line 91")])
-def test_a_static_record_that_saturates(tmp_path: Path, npy: bool, place: str) -> None:
-    samples = noise()
-    samples[90, 1] = -19.62
-    assert refusal(static(tmp_path, samples, npy), "static", limit=19.62) == (
-        f"{place}: expected column y inside the range of +-19.62, got -19.62: saturated"
-    )
-
-
-@pytest.mark.parametrize(("npy", "place"), [(False, "rest.csv, line 101"), (True, "rest.npy, line 99")])
-def test_a_static_record_that_is_too_short(tmp_path: Path, npy: bool, place: str) -> None:
-    path = static(tmp_path, noise(99), npy)
-    assert refusal(path, "static") == f"{place}: expected at least 100 samples, got 99"
-    assert len(read_static(path, shortest=99).samples) == 99
-
-
-@pytest.mark.parametrize("shortest", [0, 1])
-def test_one_sample_is_never_a_record(tmp_path: Path, shortest: int) -> None:
-    message = refusal(static(tmp_path, noise(1), npy=True), "static", shortest=shortest)
-    assert message.endswith(f"expected at least {shortest} samples, got 1")
-
-
-@pytest.mark.parametrize(("npy", "place"), [(False, "rest.csv, line 253"), (True, "rest.npy, line 251")])
-@pytest.mark.parametrize("options", [{}, {"noise_std": 0.01}])
-def test_a_static_record_that_was_pushed(tmp_path: Path, npy: bool, place: str, options: dict[str, float]) -> None:
-    samples = noise()
-    samples[250:, 1] += 0.5
-    message = refusal(static(tmp_path, samples, npy), "static", **options)
-    assert message.startswith(f"{place}: expected a record at rest, y spread by at most 0.0")
-    assert message.endswith(", got 0.242: it moved")
-
-
-@pytest.mark.parametrize(("step", "moved"), [(0.05, False), (0.065, True)])
-def test_three_times_the_noise_is_the_limit(tmp_path: Path, step: float, moved: bool) -> None:
-    """A step in the middle spreads by half of itself, beside the noise of 0.01: 0.027 is at rest, 0.034 is not."""
-    samples = noise()
-    samples[200:, 0] += step
-    path = static(tmp_path, samples, npy=True)
-    for options in ({}, {"noise_std": 0.01}):
-        if moved:
-            assert refusal(path, "static", **options).endswith("it moved")
-        else:
-            assert len(read_static(path, **options).samples) == 400
-
-
-def test_a_number_no_sensor_reads(tmp_path: Path) -> None:
-    samples = noise()
-    samples[7, 0] = 1e200
-    assert refusal(static(tmp_path, samples, npy=True), "static") == (
-        "rest.npy, line 8: expected column x inside the range of +-1e+30, got 1e+200: saturated"
-    )
-
-
-def test_a_static_record_that_sinks(tmp_path: Path) -> None:
-    samples = noise()
-    samples[:, 0] += np.linspace(0.0, 1.0, 400)
-    assert "expected a record at rest, x spread by at most" in refusal(static(tmp_path, samples), "static")
-
-
-def test_a_vibration_hides_from_its_neighbours_but_not_from_the_stated_noise(tmp_path: Path) -> None:
-    samples = noise()
-    samples[:, 2] += 0.1 * (-1.0) ** np.arange(400)
-    path = static(tmp_path, samples)
-    assert len(read_static(path).samples) == 400
-    assert refusal(path, "static", noise_std=0.01).endswith("z spread by at most 0.03, got 0.1: it moved")
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_a_record_at_rest_is_not_refused(tmp_path: Path, seed: int) -> None:
-    path = static(tmp_path, noise(100, seed), npy=True)
-    assert len(read_static(path, size=9.81, noise_std=0.01).samples) == 100
-    assert len(read_static(path, size=9.81).samples) == 100
-
-
-def test_a_sensor_that_always_says_the_same_is_at_rest(tmp_path: Path) -> None:
-    assert len(read_static(static(tmp_path, np.ones((100, 3)))).samples) == 100
-
-
-def test_a_static_record_in_g(tmp_path: Path) -> None:
-    assert refusal(static(tmp_path, noise() / 9.80665), "static", size=9.80665) == (
-        "rest.csv, line 3: expected a reading of about 9.80665, got 1.00037: it looks in g where m/s^2 belongs"
-    )
-
-
-def test_an_array_with_a_nan(tmp_path: Path) -> None:
-    samples = noise()
-    samples[41, 2] = np.nan
-    path = static(tmp_path, samples, npy=True)
-    assert refusal(path, "static") == "rest.npy, line 42: expected a finite number in column z, got nan"
-
-
-@pytest.mark.parametrize(
-    ("array", "got"),
-    [
-        (np.ones((200, 2)), "float64 (200, 2)"),
-        (np.ones(300), "float64 (300,)"),
-        (np.ones((200, 3), dtype=complex), "complex128 (200, 3)"),
-        (np.full((200, 3), "a"), "<U1 (200, 3)"),
-    ],
-)
-def test_an_array_that_is_no_record(tmp_path: Path, array: np.ndarray, got: str) -> None:
-    path = static(tmp_path, array, npy=True)
-    assert refusal(path, "static") == f"rest.npy: expected numbers of shape (n, 3), got {got}"
-
-
-def test_an_array_without_rows(tmp_path: Path) -> None:
-    path = static(tmp_path, np.ones((0, 3)), npy=True)
-    assert refusal(path, "static") == "rest.npy, line 1: expected a record, got an array without rows"
-
-
-def test_whole_numbers_are_samples_too(tmp_path: Path) -> None:
-    record = read_static(static(tmp_path, np.ones((200, 3), dtype=np.int16), npy=True))
-    assert record.samples.dtype == np.float64
-
-
-@pytest.mark.parametrize("cut", [4, 60, 1000])
-def test_an_array_that_is_cut(tmp_path: Path, cut: int) -> None:
-    path = static(tmp_path, noise(), npy=True)
-    path.write_bytes(path.read_bytes()[:cut])
-    assert refusal(path, "static").startswith("rest.npy: expected an array in the NPY format, got ")
-
-
-def test_bytes_that_only_begin_as_an_array_or_an_archive(tmp_path: Path) -> None:
-    path = static(tmp_path, noise(), npy=True)
-    huge = path.read_bytes().replace(b"(400, 3)", b"(4000000000000, 3)")
-    torn = path.read_bytes().replace(b" \n", b"(\n", 1)
-    for data in (b"PK\x03\x04" + bytes(50), huge, torn):
-        path.write_bytes(data)
-        assert refusal(path, "static").startswith("rest.npy: expected an array in the NPY format, got ")
-
-
-def test_an_array_of_objects_is_not_unpickled(tmp_path: Path) -> None:
-    path = static(tmp_path, np.array([[{}, {}, {}]]), npy=True)
-    assert refusal(path, "static").startswith("rest.npy: expected an array in the NPY format, got ")
-
-
-def test_an_archive_is_no_array(tmp_path: Path) -> None:
-    with (tmp_path / "rest.npy").open("wb") as archive:
-        np.savez(archive, samples=noise())
-    assert refusal(tmp_path / "rest.npy", "static") == "rest.npy: expected numbers of shape (n, 3), got an archive"

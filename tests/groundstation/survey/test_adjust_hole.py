@@ -20,16 +20,23 @@ DEG = math.pi / 180.0
 G = 9.79
 NOISE, PLAY, TURN_STD = 5e-4, 0.008 * DEG, 0.05 * DEG
 TUBES, LENGTH = 5, 3.0
+CURVATURE, MEMORY = 0.4 * DEG, 30.0  # rad/m, m
 
 
 def drawn_hole(
-    seed: int, inclination: float, yaw_std: float, turns: Array
+    seed: int, inclination: float, yaw_std: float, turns: Array, wanders: bool = False
 ) -> tuple[Looks, StringPrior, PathPrior, Array]:
-    """Five tubes that passed five stations of a hole that bends by some tenths of a degree a station."""
+    """Five tubes that passed five stations of a hole that bends by some tenths of a degree a station.
+
+    Or of one that wanders, and leaves its collar, as the prior of the path has it.
+    """
     random = np.random.default_rng(seed)
     angles = inclination + 0.2 * DEG * np.cumsum(random.standard_normal(TUBES + 1))
     azimuths = 2.0 + 0.3 * DEG * np.cumsum(random.standard_normal(TUBES + 1)) / max(math.sin(inclination), 0.05)
     truth = np.stack([np.sin(angles) * np.cos(azimuths), np.sin(angles) * np.sin(azimuths), np.cos(angles)], axis=1)
+    told = truth[0]
+    if wanders:
+        truth, told = wandering(np.random.default_rng([seed, 1]), inclination)
     bias, rows = 0.01 * random.standard_normal((TUBES, 3)), []
     turns = turns + TURN_STD * random.standard_normal(TUBES)
     for stop in range(TUBES):
@@ -47,9 +54,26 @@ def drawn_hole(
         np.full(TUBES, 0.01), np.full(TUBES, 1e-6), np.zeros(TUBES + 1), np.diag([TURN_STD**2] * TUBES + [1e-12]), G,
         1e-3, PLAY,
     )  # fmt: skip
-    across = np.eye(3) - np.outer(truth[0], truth[0])
+    across = np.eye(3) - np.outer(told, told)
     md = LENGTH * np.arange(TUBES + 1)
-    return looks, string, PathPrior(md, truth[0], DEG**2 * across, 0.4 * DEG, 30.0), truth
+    return looks, string, PathPrior(md, told, DEG**2 * across, CURVATURE, MEMORY), truth
+
+
+def wandering(random: np.random.Generator, inclination: float) -> tuple[Array, Array]:
+    """Directions (6, 3) of a hole whose curvature wanders, and what was told of its collar, which is off by a degree.
+
+    It goes by steps of 5 cm, in a frame that it carries along.
+    """
+    frame = Rotation.from_euler("zy", [2.0, inclination])
+    curvature, step, found = CURVATURE * random.standard_normal(2), 0.05, [frame.apply([0.0, 0.0, 1.0])]
+    off = frame * Rotation.from_rotvec([*(DEG * random.standard_normal(2)), 0.0])
+    kept = math.exp(-step / MEMORY)
+    for _ in range(TUBES):
+        for _ in range(round(LENGTH / step)):
+            frame *= Rotation.from_rotvec([*(step * curvature), 0.0])
+            curvature = kept * curvature + CURVATURE * math.sqrt(1.0 - kept**2) * random.standard_normal(2)
+        found.append(frame.apply([0.0, 0.0, 1.0]))
+    return np.array(found), off.apply([0.0, 0.0, 1.0])
 
 
 def felt(tangent: Array, face: float, tilt: Array) -> Array:
@@ -136,3 +160,29 @@ def test_an_untold_joint_is_found_from_what_other_tubes_saw(turn_deg: float) -> 
     assert std < 2.0 * DEG
     assert found.now.tubes[2, TURN] == pytest.approx(turns[2], abs=4.0 * std)
     assert np.max(squares_of(found, truth)) < 8.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("yaw_std_deg", [10.0, 20.0])
+@pytest.mark.parametrize("inclination_deg", [0.5, 30.0, 60.0, 90.5, 140.0, 179.5])
+def test_yaws_that_are_hardly_known_leave_sigmas_honest_and_inclinations_as_sharp(
+    inclination_deg: float, yaw_std_deg: float
+) -> None:
+    """The hole wanders as its prior has it. Inclinations are as good as with yaws well known, and as those of a look.
+
+    Beside the vertical a yaw tells a lean from a bias, and they are as good as a look alone at the least.
+    """
+    squares, off, alone = list[Array](), dict[float, list[Array]]({0.02: [], yaw_std_deg: []}), list[Array]()
+    for seed in range(40):
+        for std, errors in off.items():
+            looks, string, path, truth = drawn_hole(seed, inclination_deg * DEG, std * DEG, np.zeros(TUBES), True)
+            found = adjust_hole(looks, string, path)
+            true_inclination = polar(truth)[0]
+            errors.append(polar(found.now.tangents[1:])[0] - true_inclination[1:])
+        squares.append(squares_of(found, truth))
+        read = np.arctan2(np.hypot(looks.force[:, 0], looks.force[:, 1]), -looks.force[:, 2])
+        alone.append(read - true_inclination[looks.station])
+    assert 0.65 < np.mean(squares) < 1.4  # of 40 holes, whose stations share their azimuth
+    well, poorly = (float(np.sqrt(np.mean(np.square(errors)))) for errors in off.values())
+    assert poorly < 1.05 * well or not 1.0 < inclination_deg < 179.0
+    assert poorly < 0.6 * np.sqrt(np.mean(np.concatenate(alone) ** 2))

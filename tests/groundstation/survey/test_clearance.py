@@ -14,10 +14,14 @@ from scipy.spatial import cKDTree
 
 from groundstation.errors import SurveyError
 from groundstation.survey.path.leg_wander import LegWander
+from groundstation.survey.requests.clearance_answer import answer_clearance
+from groundstation.survey.requests.clearance_request import ClearanceRequest
+from groundstation.survey.requests.survey_request import SiteFigures
 from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, Term, load_tool
 from groundstation.survey.well.clearance import ClearanceHole, HolePair, Rule, clearance_between
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
 from groundstation.survey.well.hole_wander import HoleWander
+from groundstation.survey.well.leg_errors import leg_errors
 from groundstation.survey.well.methods import Method, station_positions
 
 DATA = Path(__file__).parents[2] / "data" / "survey"
@@ -58,7 +62,7 @@ def test_separation_factors_are_those_of_the_standard_set(name: str) -> None:
     factors = found.stations.independent_factor
     assert len(expected) == len(factors) == (69 if name == "10" else 100)
     assert float(factors.min()) == pytest.approx(float(expected.min()), abs=5e-4)
-    # beside it the printed ones of the sidetrack count some of its errors from the surface
+    # beside it those of the sidetrack: see the test below
     np.testing.assert_allclose(factors, expected, rtol=2e-2 if name == "10" else 3e-3, atol=1e-3)
     least = float(found.least.independent_factor[0])
     if name not in BETWEEN:
@@ -68,6 +72,78 @@ def test_separation_factors_are_those_of_the_standard_set(name: str) -> None:
     assert least == pytest.approx(factor, abs=1e-4)
     assert least < float(factors.min()) - 5e-3
     assert (float(found.least.md[0]), float(found.least.offset_md[0])) == pytest.approx((md, offset_md), abs=0.1)
+
+
+def test_the_printed_sidetrack_has_its_kick_off_station_misaligned_in_one_of_its_two_holes() -> None:
+    """What our factors of well 10 are off by: 1.8 % without it, and 0.6 % with it, as the other wells are by 0.3 %.
+
+    The station at 900 m is the last that both holes have, and what it reads wrong moves both alike. The set counts its
+    misalignment, a tenth of a degree to north and east, over the half leg of 15 m below it, in one of them.
+    """
+    reference, _ = published("reference", KICK_OFF)
+    offset, expected = published("10")
+    pair = HolePair(reference, offset, SITE, Rule())
+    found = pair.separations(np.arange(69.0))
+    leg, part, distance = pair.theirs.nearest(reference.positions)
+    unit = (reference.positions - pair.theirs.places(leg, part)) / np.maximum(distance, 1e-9)[:, None]
+    errors = leg_errors(offset.survey, offset.legs, SITE)
+    room = distance - reference.radius - offset.radius - 0.3
+    stated = (room / (3.5 * found.independent_factor)) ** 2  # half a metre of the rule in it
+    variance = stated.copy()
+    for name, axis in (("XYM3", 0), ("XYM4", 1)):
+        ours = np.sum(errors.effect((name, PropagationMode.SYSTEMATIC), leg, part) * unit, axis=1)
+        variance += (ours + 0.1 * DEG * 15.0 * unit[:, axis]) ** 2 - ours**2
+    with_it = found.independent_factor * np.sqrt(stated / variance)
+    departures = [np.abs(one[1:] / expected[1:] - 1.0) for one in (found.independent_factor, with_it)]
+    assert 0.015 < float(departures[0].max()) < 0.02
+    assert float(departures[1].max()) < 6e-3
+    assert float(np.sqrt(np.mean(departures[1] ** 2))) < 0.3 * float(np.sqrt(np.mean(departures[0] ** 2)))
+
+
+def recorded(path: Path, parts: list[tuple[str, slice]]) -> Path:
+    """A record of stations of wells of the set, one part below the other."""
+    rows = [row for name, some in parts for row in zip(*angles_of(published(name)[0].survey, some), strict=True)]
+    path.write_text("md_m,inclination_deg,azimuth_deg\n" + "".join(f"{m!r},{i!r},{a!r}\n" for m, i, a in rows))
+    return path
+
+
+def angles_of(survey: WellSurvey, some: slice) -> list[list[float]]:
+    return [survey.md[some].tolist(), *((one[some] / DEG).tolist() for one in (survey.inclination, survey.azimuth))]
+
+
+@pytest.mark.parametrize("begins_at_kick_off", [True, False])
+def test_a_sidetrack_in_files_is_compared_from_where_it_leaves_the_hole(
+    tmp_path: Path, begins_at_kick_off: bool
+) -> None:
+    above = [] if begins_at_kick_off else [("reference", slice(0, KICK_OFF))]
+    request = ClearanceRequest(
+        recorded(tmp_path / "whole.csv", [("reference", slice(None))]),
+        recorded(tmp_path / "side.csv", [*above, ("10", slice(None))]),
+        instrument="mwd-rev4", radius_m=RADII["reference"], offset_radius_m=0.3048, from_m=900.0,
+        site=SiteFigures(9.80665, 50_000.0, 70.0, 0.0, 60.0),
+    )  # fmt: skip
+    found, expected = answer_clearance(request), published("10")[1]
+    factors = [row["independent_factor"] for row in found["stations"]]
+    assert found["stations"][0]["md_m"] == 900.0
+    np.testing.assert_allclose(factors, expected, rtol=2e-2, atol=2e-3)
+
+
+@pytest.mark.parametrize("forgotten_m", [5.0, 20.0])
+def test_each_path_wanders_as_its_own_instrument_leaves_it(tmp_path: Path, forgotten_m: float) -> None:
+    """Of ``relay`` it is counted and of the industry's models not, whichever of the two holes they surveyed."""
+    record = tmp_path / "hole.csv"
+    record.write_text("md_m,inclination_deg,azimuth_deg\n" + "".join(f"{md},2,30\n" for md in range(0, 121, 10)))
+    own = HoleWander(10.0 * np.arange(13.0), LegWander(0.3 * DEG, forgotten_m)).variances(np.array([11]), np.ones(1))[0]
+    for mine, theirs, times in (("relay", "mwd-rev4", 1), ("mwd-rev4", "relay", 1), ("relay", "relay", 2)):
+        request = ClearanceRequest(
+            record, record, instrument=mine, offset_instrument=theirs, offset_head=(0.0, 9.0, 0.0),
+            curvature_length_m=forgotten_m,
+        )  # fmt: skip
+        moved, still = (
+            answer_clearance(one)["stations"][-1]["sigma_m"] ** 2
+            for one in (request, replace(request, curvature_sigma_deg_per_m=0.0))
+        )
+        assert moved - still == pytest.approx(times * own, rel=0.01)
 
 
 @pytest.mark.parametrize("course", [30.0, 100.0])
@@ -164,6 +240,26 @@ def test_parallel_holes_of_one_instrument_err_alike_and_of_two_do_not() -> None:
     assert alike.stations.independent_factor[-1] == pytest.approx(apart.stations.factor[-1])
 
 
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
+def test_what_errs_alike_along_a_bent_hole_bows_its_legs_as_it_turns_them(share: float) -> None:
+    """An azimuth that is off all along turns the whole hole about the vertical, and so every point of its arcs.
+
+    Against the line between the two ends of a leg, which the stations below the first tell.
+    """
+    tool = SurveyTool("t", "t", (Term("A", 1.0, "deg", PropagationMode.SYSTEMATIC, ("0", "0", "1")),))
+    md, inclination = 10.0 * np.arange(6), 0.2 * np.arange(6)
+    places = station_positions(Method.MINIMUM_CURVATURE, md, inclination, np.full(6, 0.7))
+    survey = WellSurvey(md, inclination, np.full(6, 0.7), places[:, 2])
+    hole = ClearanceHole(survey, places, (Leg(tool),), 0.1)
+    pair, errors, legs = HolePair(hole, hole, SITE, Rule()), leg_errors(survey, hole.legs, SITE), np.arange(1, 5)
+    ends = errors.effect(("A", PropagationMode.SYSTEMATIC), legs, np.zeros(4)) * (1.0 - share)
+    ends += errors.effect(("A", PropagationMode.SYSTEMATIC), legs, np.ones(4)) * share
+    bowed = errors.effect(("A", PropagationMode.SYSTEMATIC), legs, np.full(4, share)) - ends
+    arc = pair.mine.places(legs, np.full(4, share)) - (1.0 - share) * places[1:-1] - share * places[2:]
+    turned = 1.0 * DEG * np.cross([0.0, 0.0, 1.0], arc)
+    np.testing.assert_allclose(bowed, turned, rtol=0.03, atol=1e-6)
+
+
 def test_holes_against_each_other_err_against_each_other() -> None:
     steep = 30.0 * DEG
     east, west = (
@@ -232,9 +328,10 @@ def drawn_departures(md: np.ndarray, std: float, length: float, share: float, dr
 
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.3, 0.6, 1.0])
-def test_a_path_between_stations_wanders_as_drawn_ones_do(share: float) -> None:
-    md, wander = np.array([0.0, 10.0, 16.0, 36.0]), LegWander(0.3 * DEG, 20.0)
-    claimed = HoleWander(md, wander).variances(np.array([2]), np.array([share]))[0]
+@pytest.mark.parametrize("stations", [(0.0, 10.0, 16.0, 36.0), (0.0, 30.0), (0.0, 30.0, 60.0, 90.0)])
+def test_a_path_between_stations_wanders_as_drawn_ones_do(share: float, stations: tuple[float, ...]) -> None:
+    md, wander = np.array(stations), LegWander(0.3 * DEG, 20.0)
+    claimed = HoleWander(md, wander).variances(np.array([len(md) - 2]), np.array([share]))[0]
     drawn = drawn_departures(md, wander.std, wander.length, share, 4000)
     assert np.mean(drawn**2) == pytest.approx(claimed, rel=0.12)
 

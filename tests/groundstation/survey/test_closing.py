@@ -4,11 +4,14 @@ import math
 from datetime import date
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from groundstation.errors import SurveyError
-from groundstation.survey.wall.closing import ClosingDay
+from groundstation.survey.wall.as_built import Columns
+from groundstation.survey.wall.closing import ClosingDay, closing_by_day
 from groundstation.survey.wall.wall_file import read_wall
+from groundstation.survey.wall.wall_joints import Detour
 
 PIPES, ACROSS = 12, 2.4  # of a ring of freeze pipes; m, its diameter
 DAYS = [f"2026-11-{10 + k // 4}" for k in range(PIPES)]
@@ -58,6 +61,16 @@ def test_a_pipe_that_is_not_drilled_leaves_its_joints_open_until_another_stands_
     found = ring(tmp_path, [*DAYS[:-1], ""], more=stand_in)
     assert (found[-1].day, found[-1].drilled, found[-1].closed) == (date(2026, 11, 20), ["X"], 1.0)
     assert found[-2].open_joints == 2
+
+
+def test_a_column_between_two_closes_their_joint_with_the_later_of_its_own_two() -> None:
+    heads, depths = np.array([[0.0, 0.0], [0.0, 1.3], [0.0, 0.65]]), np.array([0.0, 1.0])
+    centres = np.repeat(heads[:, None], 2, axis=1)
+    columns = Columns.surveyed(["A", "B", "X"], depths, centres, np.zeros((3, 2, 2, 2)), heads, 0.4)
+    days = [date(2026, 11, 10), date(2026, 11, 12), date(2026, 11, 11)]
+    joint, detour = np.array([[0, 1]]), Detour(0, np.array([[0, 2], [2, 1]]))
+    found = closing_by_day(columns, joint, 0.1, days, [detour])
+    assert [(stage.day.day, stage.closed) for stage in found] == [(10, 0.0), (11, 0.0), (12, 1.0)]
 
 
 def test_without_a_day_nothing_is_said_of_time(tmp_path: Path) -> None:

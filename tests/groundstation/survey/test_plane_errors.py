@@ -9,15 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.survey.tools.instruments import load_tool
+from groundstation.survey.tools.instruments import PropagationMode, load_tool
+from groundstation.survey.wall.as_built import intersect_planes
 from groundstation.survey.wall.column_deviation import ColumnDesign
-from groundstation.survey.wall.column_errors import reduce_error_columns
+from groundstation.survey.wall.column_errors import reduce_error_columns, shared_name
 from groundstation.survey.wall.column_plans import Assumptions, ColumnPlan, ColumnSurvey
 from groundstation.survey.wall.judged_wall import judge_wall
 from groundstation.survey.wall.plane_errors import PlaneErrors
 from groundstation.survey.wall.wall_columns import build_wall
 from groundstation.survey.wall.wall_errors import COLUMNS, PLACES, batch_groups
 from groundstation.survey.wall.wall_file import read_wall
+from groundstation.survey.well.error_columns import ErrorColumns
 
 
 @given(st.integers(0, 10_000), st.integers(2, 8), st.integers(0, 40))
@@ -102,3 +104,35 @@ def test_a_wall_of_four_times_as_many_columns_needs_not_four_times_the_memory(tm
         tracemalloc.stop()
         assert 0.0 < judgement.system.probability < 1.0
     assert peaks[1] < 3.0 * peaks[0]
+
+
+@pytest.mark.parametrize(
+    ("mode", "shared_as"),
+    [
+        (PropagationMode.RANDOM, None),
+        (PropagationMode.SECTION, None),  # of one run of a gyro, which surveys one column
+        (PropagationMode.SYSTEMATIC, "7/A"),
+        (PropagationMode.WELL, "7/A"),
+        (PropagationMode.GLOBAL, "A"),
+    ],
+)
+def test_columns_share_what_one_instrument_errs_in_all_of_them(mode: PropagationMode, shared_as: str | None) -> None:
+    source = ErrorColumns("A", mode, np.zeros((1, 2, 3, 1)))
+    assert shared_name(source, ColumnPlan(ColumnDesign(), load_tool("relay"), serial="7")) == shared_as
+    alone = shared_name(source, ColumnPlan(ColumnDesign(), load_tool("relay")))
+    assert alone == (shared_as if mode is PropagationMode.GLOBAL else None)
+
+
+@given(st.integers(0, 10_000))
+def test_what_a_hole_errs_moves_the_point_in_which_a_plane_cuts_it(seed: int) -> None:
+    """A straight hole that leans across the planes is moved as a whole, and cut again: depth counts by its slope."""
+    rng = np.random.default_rng(seed)
+    slope = rng.uniform(-1.5, 1.5, 2)
+    tangent = np.array([*slope, 1.0]) / math.sqrt(1.0 + float(slope @ slope))
+    positions = np.linspace(0.0, 20.0, 6)[:, None] * tangent + rng.normal(size=3)
+    error = rng.normal(0.0, 0.02, 3)
+    tangents, depths = np.tile(tangent, (1, 6, 1)), positions[0, 2] + np.array([0.5, 3.0, 7.5])
+    before, after = (intersect_planes(one[None], tangents, depths) for one in (positions, positions + error))
+    claimed = before.in_plane(np.tile(error[:, None], (1, 6, 1, 1)))[0, :, :, 0]
+    np.testing.assert_allclose(claimed, np.tile(after.centres[0, 0] - before.centres[0, 0], (6, 1)), atol=1e-12)
+    np.testing.assert_allclose(after.centres - before.centres, claimed[None, :3], atol=1e-12)

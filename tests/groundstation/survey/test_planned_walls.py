@@ -92,6 +92,21 @@ def test_what_is_not_surveyed_bends_as_the_plan_does(tmp_path: Path) -> None:
     np.testing.assert_allclose(wall.columns.centres[0], wall.columns.planned[0], atol=1e-3)
 
 
+def test_what_is_not_surveyed_keeps_what_its_last_survey_is_off_the_plan(tmp_path: Path) -> None:
+    """Three degrees off at the last survey are three degrees all the way down, and not put right below it."""
+    heads = "column,north_m,east_m,drilled_to_m\nA,0,0,20\nB,0,0.75,20\n"
+    path = wall_of(tmp_path, {"A": 8.0, "B": LENGTH}, heads=heads)
+    off_plan = "".join(f"A,{k},{BUILD * k + 3.0},0\n" for k in range(9))
+    lines = (tmp_path / "stations.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "stations.csv").write_text(lines[0] + off_plan + "".join(lines[10:]))
+    columns = read_wall(path).columns
+    off = columns.centres[0, :, 0] - columns.planned[0, :, 0]
+    for top, bottom in ((2.0, 6.0), (9.0, 13.0), (14.0, 18.0)):
+        above, below = (int(np.argmin(np.abs(columns.depths - depth))) for depth in (top, bottom))
+        grown = float(off[below] - off[above]) / float(columns.depths[below] - columns.depths[above])
+        assert grown == pytest.approx(math.tan(3.0 * DEG), rel=0.15)
+
+
 def test_a_plan_that_is_too_short_is_refused_and_closes_no_day_too_early(tmp_path: Path) -> None:
     heads = "column,north_m,east_m,plan,drilled_on\nA,0,0,plan.toml,2026-01-01\nB,0,0.75,short.csv,2026-01-02\n"
     (tmp_path / "short.csv").write_text("".join(STATIONS_OF_PLAN.splitlines(keepends=True)[:13]))

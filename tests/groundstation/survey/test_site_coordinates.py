@@ -88,7 +88,7 @@ def test_coordinates_of_the_sites_own_axes_are_not_turned(tmp_path: Path) -> Non
     [
         (FrameRequest("magnetic", origin=ORIGIN), "count from grid north; expected --convergence-deg beside it"),
         (frame("grid", None, grid_scale_factor=0.0), "grid scale factor: expected metres of the grid a metre on the"),
-        (frame("grid", None, grid_scale_factor=math.nan), "0.9..1.1, got nan"),
+        (frame("grid", None, grid_scale_factor=math.nan), "--grid-scale-factor: expected a finite number, got nan"),
         (frame("grid", None, origin=None), "--grid-scale-factor: expected --origin beside it"),
     ],
 )

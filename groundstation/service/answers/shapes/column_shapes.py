@@ -157,5 +157,6 @@ class Verdict:
     bit_md_m: Annotated[float | None, "measured depth of the bit"]
     target_m: Annotated[float, "length of the design axis"]
     what: Annotated[str | None, "which deviation decided", OneOf("deviation", "projection")]
+    unfound_cm: Annotated[float, "by which the toe may be off if the tube errs that read the last station alone"]
     off: Off | None
     steer: Steer | None

@@ -27,6 +27,8 @@ class SetupRow:
     utc: Annotated[str, "when that was"]
     age_s: Annotated[float | None, "since then; null where no order told it"]
     times_told: Annotated[int, "by orders, also what does not stand any more"]
+    check: Annotated[str, "what checks it, in words; empty where readings show a slip, or it was not told"]
+    least_slip: Annotated[float | None, "smallest slip that its check shows; null where it has none"]
     toe_cm: Annotated[float, "standard deviation that it makes at the toe"]
     way: Annotated[str, "across the hole, or along it where it is one of the depth", OneOf("across", "along")]
 
@@ -35,8 +37,11 @@ class SetupRow:
 class SetupAnswer:
     """What is known of the rig: what is missing first, then what costs most at the toe, across the hole, then along."""
 
-    ready: Annotated[bool, "nothing is missing"]
+    ready: Annotated[bool, "nothing is missing, unchecked or contradicted"]
     missing: Annotated[list[str], "items without which the hole is not known"]
+    unchecked: Annotated[list[str], "items that were told once, of which no reading shows a slip, and nothing checks"]
+    hold: Annotated[str, "why it is not ready, in words; empty where it is"]
+    contradicted: Annotated[list[str], "what is told one way and checked another, in words"]
     todo: Annotated[str, "the next thing to do"]
     worst: Annotated[str, "item that costs most at the toe, across the hole"]
     costs_most: Annotated[str, "the same for people, with what it costs"]

@@ -99,13 +99,15 @@ export interface Verdict {
   /** what it rests on, or why it is not known */
   why: string[];
   /** why it is not known, as words */
-  doubts: ("no_survey" | "stale" | "depth" | "clock" | "yaw" | "uncertain" | "setup" | "contradiction")[];
+  doubts: ("no_survey" | "stale" | "depth" | "clock" | "yaw" | "uncertain" | "setup" | "unchecked" | "contradiction")[];
   /** measured depth of the bit */
   bit_md_m: number | null;
   /** length of the design axis */
   target_m: number;
   /** which deviation decided */
   what: "deviation" | "projection" | null;
+  /** by which the toe may be off if the tube errs that read the last station alone */
+  unfound_cm: number;
   off: Off | null;
   steer: Steer | null;
 }
@@ -728,6 +730,10 @@ export interface SetupRow {
   age_s: number | null;
   /** by orders, also what does not stand any more */
   times_told: number;
+  /** what checks it, in words; empty where readings show a slip, or it was not told */
+  check: string;
+  /** smallest slip that its check shows; null where it has none */
+  least_slip: number | null;
   /** standard deviation that it makes at the toe */
   toe_cm: number;
   /** across the hole, or along it where it is one of the depth */
@@ -736,10 +742,16 @@ export interface SetupRow {
 
 /** What is known of the rig: what is missing first, then what costs most at the toe, across the hole, then along. */
 export interface SetupAnswer {
-  /** nothing is missing */
+  /** nothing is missing, unchecked or contradicted */
   ready: boolean;
   /** items without which the hole is not known */
   missing: string[];
+  /** items that were told once, of which no reading shows a slip, and nothing checks */
+  unchecked: string[];
+  /** why it is not ready, in words; empty where it is */
+  hold: string;
+  /** what is told one way and checked another, in words */
+  contradicted: string[];
   /** the next thing to do */
   todo: string;
   /** item that costs most at the toe, across the hole */
@@ -762,7 +774,7 @@ export interface Alarm {
   /** how far it is */
   state: "raised" | "acknowledged" | "shelved" | "latched" | "cleared";
   /** kind: of the rig's, or deviation, projection */
-  code: "survey_untrusted" | "survey_set_aside" | "survey_unplaced" | "survey_refused" | "survey_missing" | "numbers_missing" | "numbers_lost" | "tube_counts_anew" | "tube_restarted" | "tube_silent" | "tube_sensor" | "tube_disk" | "tube_queue" | "clock" | "epoch" | "reference" | "joint" | "belt" | "blunder" | "depth_refused" | "depth_silent" | "depth_contradicts" | "disk" | "database" | "queue" | "bad_input" | "wrong_password" | "page_restarted" | "seal_refused" | "key_file" | "deviation" | "projection";
+  code: "survey_untrusted" | "survey_set_aside" | "survey_unplaced" | "survey_refused" | "survey_missing" | "numbers_missing" | "numbers_lost" | "tube_counts_anew" | "tube_restarted" | "tube_silent" | "tube_sensor" | "tube_disk" | "tube_queue" | "clock" | "epoch" | "reference" | "joint" | "belt" | "blunder" | "depth_refused" | "depth_silent" | "depth_contradicts" | "disk" | "lease" | "database" | "queue" | "bad_input" | "wrong_password" | "page_restarted" | "seal_refused" | "key_file" | "deviation" | "projection";
   /** how much it matters */
   level: "notice" | "degraded" | "bad";
   /** what it is about */
@@ -836,7 +848,7 @@ export interface MovedStation {
 /** One alarm of the rig itself. */
 export interface RigAlarmRow {
   /** kind of alarm, see [operating](operate.md#what-the-crew-is-told) */
-  code: "survey_untrusted" | "survey_set_aside" | "survey_unplaced" | "survey_refused" | "survey_missing" | "numbers_missing" | "numbers_lost" | "tube_counts_anew" | "tube_restarted" | "tube_silent" | "tube_sensor" | "tube_disk" | "tube_queue" | "clock" | "epoch" | "reference" | "joint" | "belt" | "blunder" | "depth_refused" | "depth_silent" | "depth_contradicts" | "disk" | "database" | "queue" | "bad_input" | "wrong_password" | "page_restarted" | "seal_refused" | "key_file";
+  code: "survey_untrusted" | "survey_set_aside" | "survey_unplaced" | "survey_refused" | "survey_missing" | "numbers_missing" | "numbers_lost" | "tube_counts_anew" | "tube_restarted" | "tube_silent" | "tube_sensor" | "tube_disk" | "tube_queue" | "clock" | "epoch" | "reference" | "joint" | "belt" | "blunder" | "depth_refused" | "depth_silent" | "depth_contradicts" | "disk" | "lease" | "database" | "queue" | "bad_input" | "wrong_password" | "page_restarted" | "seal_refused" | "key_file";
   /** how much it matters */
   level: "notice" | "degraded" | "bad";
   /** what it is about */

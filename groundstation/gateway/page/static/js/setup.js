@@ -13,6 +13,8 @@ const FIELDS = {
   joint: [TUBE, ["angle_deg", "angle °"], ["sigma_deg", "σ °"], ["used_deg", "node was told °", null], ["upper", "above it, 0 is the drive", null]],
   length: [TUBE, ["length_m", "length m"], ["sigma_m", "σ m"]],
   stick_up: [["height_m", "over the collar m"], ["sigma_m", "σ m"]],
+  "check north": [["angle_deg", "second bearing of the zero °"], ["sigma_deg", "σ °"]],
+  "check stick_up": [["height_m", "second reading, over the collar m"], ["sigma_m", "σ m"]],
 };
 const WITH_TUBE = ["joint", "length"]; // the others are one of the rig
 
@@ -24,7 +26,7 @@ const WITH_TUBE = ["joint", "length"]; // the others are one of the rig
 export function showSetup(setup, now) {
   if (!setup) return;
   byId("ready").className = setup.ready ? "" : "not";
-  write(byId("ready"), setup.ready ? "Ready to drill: north and every joint are told" : `NOT READY TO DRILL, not told: ${setup.missing.join(", ")}`);
+  write(byId("ready"), setup.ready ? "Ready to drill: north and every joint are told" : `NOT READY TO DRILL, ${setup.hold}`);
   const whose = setup.surveyed ? "as surveyed" : "of the design";
   const [todo, how] = setup.todo.split(/: (.*)/);
   write(byId("worst"), `Costs most at the toe: ${setup.costs_most}`);
@@ -32,9 +34,9 @@ export function showSetup(setup, now) {
   write(byId("how"), how?.startsWith("cmd/") ? `by the form below, or ${how}` : "");
   write(byId("costs"), `Toe at ${setup.at_m.toFixed(1)} m, ${whose}. Its ± has besides: ${setup.left_out}.`);
   fillList(byId("setup-items"), setup.items, (row) => row.item, () => element("tr", {}, ...Array.from({ length: 7 }, () => element("td"))), (line, row) => {
-    line.className = row.missing ? "grave" : !row.told && row.toe_cm >= LEAST_CM ? "serious" : "";
+    line.className = row.missing || /^(not|contra)/.test(row.check) ? "grave" : !row.told && row.toe_cm >= LEAST_CM ? "serious" : "";
     const toe = `${row.toe_cm.toFixed(1)}${row.toe_cm >= LEAST_CM && row.way === "along" ? " along" : ""}`;
-    const texts = [row.words, toe, valueText(row), plain(row.sigma), row.unit, ageText(row, now), `${row.source}: ${row.detail}`];
+    const texts = [row.words, toe, valueText(row), plain(row.sigma), row.unit, ageText(row, now), `${row.source}: ${row.detail}${row.check && "; "}${row.check}`];
     texts.forEach((text, place) => write(line.children[place], text));
   });
 }
@@ -54,7 +56,8 @@ export function connectSetup(order) {
     submitted.preventDefault();
     const told = [...byId("tell-fields").querySelectorAll("input")].filter((input) => input.value !== "");
     const parameters = Object.fromEntries(told.map((input) => [input.name, input.value]));
-    order(kind.value, WITH_TUBE.includes(kind.value) ? parameters : { action: "tell", ...parameters });
+    const [name, action] = kind.value.startsWith("check ") ? [kind.value.slice(6), "check"] : [kind.value, "tell"];
+    order(name, WITH_TUBE.includes(name) ? parameters : { action, ...parameters });
   });
   byId("take-back").addEventListener("click", () => order("setup", { action: "undo" }));
 }

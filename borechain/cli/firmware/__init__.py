@@ -1,0 +1,1 @@
+"""``borechain firmware``: the step of a node for a chip."""

@@ -1,0 +1,128 @@
+"""The solution of the normal equations of a hole: the factorised chain of its path, and what its stations share."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+WIDE = 150  # unknowns, from which on Cholesky's factor is worth its calls: it takes half of what a general inverse does
+
+
+@dataclass(frozen=True)  # with a dictionary, for what is worked out once
+class InCommon:
+    """Normal equations of what stations have in common, the path taken out.
+
+    Parameters
+    ----------
+    information : (p, p)
+    right : (p,)
+    """
+
+    information: Array
+    right: Array
+
+    @cached_property
+    def factor(self) -> Array:
+        """Lower Cholesky factor (p, p) of the information; what is above it is left over.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            When the information is none.
+        """
+        from scipy.linalg import lapack
+
+        factor, failed = lapack.dpotrf(self.information.T, lower=1)  # symmetric: as the library lays out its matrices
+        if failed:
+            raise np.linalg.LinAlgError("expected information that is positive definite")
+        return np.asarray(factor)
+
+    @cached_property
+    def cov(self) -> Array:
+        """Covariance (p, p)."""
+        if len(self.right) < WIDE:
+            return np.asarray(np.linalg.inv(self.information), np.float64)
+        from scipy.linalg import lapack
+
+        lower = np.tril(lapack.dpotri(self.factor, lower=1)[0])
+        return np.asarray(lower + np.tril(lower, -1).T)
+
+    @cached_property
+    def step(self) -> Array:
+        """Solution (p,)."""
+        if len(self.right) < WIDE:
+            return np.asarray(self.cov @ self.right)
+        from scipy.linalg import lapack
+
+        return np.asarray(lapack.dpotrs(self.factor, self.right, lower=1)[0])
+
+
+@dataclass(frozen=True, slots=True)
+class LinearSolution:
+    """The factorised chain, what stations have in common, and the step.
+
+    Parameters
+    ----------
+    diagonal, tied : (s + 1, 4, 4), as ``eliminate_path`` leaves them
+    coupled : (s + 1, 4, p), likewise
+    in_common : of what stations have in common
+    states : (s + 1, 4), step of directions and curvatures
+    of_path : by how much the sum of squares is less for a step of these alone
+    at_station, whole : (s + 1, 2, 2) and (p, p), information of the looks on each direction, and of looks and what was
+        known before on what stations have in common, before the path was taken out
+    """
+
+    diagonal: Array
+    tied: Array
+    coupled: Array
+    in_common: InCommon
+    states: Array
+    of_path: float
+    at_station: Array
+    whole: Array
+
+    @property
+    def cov(self) -> Array:
+        """Covariance (p, p) of what stations have in common."""
+        return self.in_common.cov
+
+    @property
+    def common(self) -> Array:
+        """Step (p,) of what stations have in common."""
+        return self.in_common.step
+
+    @property
+    def step(self) -> float:
+        """Largest step of an unknown in its standard deviations, at most as the equations know them; NaN if one is."""
+        of_common = np.max(np.abs(self.common) / np.sqrt(np.diag(self.cov)), initial=0.0)
+        rigid = np.einsum("kab,kab->ka", self.diagonal, self.diagonal)  # of what is left of each block
+        return float(np.maximum(of_common, np.max(np.abs(self.states) * np.sqrt(rigid))))
+
+    def told_by(self, own_covs: Array, columns: Array, known: Array) -> float:
+        """How many numbers the looks tell: the trace of their information times the covariance of all unknowns.
+
+        Of directions and what is in common that is summed station by station; what they have with each other is
+        tr(B^T Q) with Q = S^-1 B C, which is what taking out the path has taken from the information in common.
+
+        Parameters
+        ----------
+        own_covs, columns : (s + 1, 2, 2) and (s + 1, 2, p), covariances of the directions were all else known, and
+            their change for one standard deviation of independent errors in common
+        known : (p, p), information on what is in common before any look
+        """
+        of_directions = float(np.sum(self.at_station * (own_covs + columns @ np.swapaxes(columns, 1, 2))))
+        return of_directions + 2.0 * len(known) - float(np.sum((self.whole + known) * self.cov))
+
+    @property
+    def decrement(self) -> float:
+        """Newton's decrement: nothing linear in the unknowns goes by more of its standard deviations in the step.
+
+        It is the root of the decrease of the sum of squares. NaN where the step is. Source: Boyd and Vandenberghe,
+        "Convex Optimization", Cambridge (2004), 9.5.1; the bound by Cauchy and Schwarz.
+        """
+        return math.sqrt(max(self.of_path + float(self.common @ self.in_common.right), 0.0))

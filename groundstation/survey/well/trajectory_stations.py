@@ -1,0 +1,160 @@
+"""The stations of a trajectory: direction, depth and errors of each, and how these go on down the hole.
+
+What stations share may become more columns as the hole grows; the columns of a point are those known when it was added.
+Frame: north, east, down; m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from operator import attrgetter
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.fusion.packed import Packed
+from groundstation.survey.fusion.resolve import Direction
+from groundstation.survey.fusion.sphere_direction import tangent_errors
+from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
+from groundstation.survey.well.depth_errors import EXACT, StationDepth
+from groundstation.survey.well.trajectory_rows import FEWEST, GROWTH, ROW, Followed, TrajectorySums, runs_of
+
+Array = npt.NDArray[np.float64]
+BLOCK = 64  # stations from mark to mark
+PLACES, VALUES = map(attrgetter, ("places", "values"))
+DEPTH_PLACES, DEPTH_VALUES = map(attrgetter, ("columns.places", "columns.values"))
+NONE: Final = Packed(np.zeros((2, 0)))
+NOTHING: Final = np.zeros(0)
+FROM_ZERO: Final = np.zeros(1, np.intp)
+
+
+class TrajectoryStations:
+    """Collar and stations in the order of depth.
+
+    Attributes
+    ----------
+    rows : numbers of each, some of them not used yet
+    directions, depths : of each
+    """
+
+    def __init__(self) -> None:
+        self.rows = np.zeros(FEWEST, ROW)
+        self.directions: list[Direction] = []
+        self.depths: list[StationDepth] = []
+        self._columns: list[Packed] = []  # (2, s), of each direction
+        self._down: list[Array] = []  # and what those come to in the vertical, (c,) of those that are kept
+
+    def __len__(self) -> int:
+        return len(self.directions)
+
+    def insert(self, place: int, md: float, direction: Direction) -> None:
+        """Insert a row for a station; what follows from its direction is not in it yet."""
+        known, count = self.rows, len(self.directions)
+        if count == len(known):
+            self.rows = np.zeros(count + 1 + count // GROWTH, ROW)
+            self.rows[:count] = known
+        self.rows[place + 1 : count + 1] = self.rows[place:count]
+        self.rows["md"][place] = md
+        self.directions.insert(place, direction)
+        self._columns.insert(place, NONE)
+        self._down.insert(place, NOTHING)
+        self.depths.insert(place, EXACT)
+
+    def append_all(self, stations: Sequence[tuple[float, Direction]], depths: Mapping[float, StationDepth]) -> None:
+        """Append stations (m, direction) in their order; a depth that is not told is exact."""
+        count, more = len(self), len(stations)
+        if count + more > len(self.rows):
+            known, self.rows = self.rows[:count], np.zeros(count + more + count // GROWTH, ROW)
+            self.rows[:count] = known
+        for md, direction in stations:
+            self.directions.append(direction)
+            self.depths.append(depths.get(md, EXACT))
+        self.rows["md"][count : count + more] = [md for md, _ in stations]
+        self._columns += [NONE] * more
+        self._down += [NOTHING] * more
+
+    def direct(self, places: Sequence[int]) -> None:
+        """Compute the rows at some places that depend on their own direction alone."""
+        if not places:
+            return
+        directions = [*map(self.directions.__getitem__, places)]
+        tangents = tangents_of(directions)
+        jacobians = tangent_jacobians(tangents)
+        counts, own_vars = [], []
+        rows, at = self.rows, np.array(places)
+        for place, direction, jacobian in zip(places, directions, jacobians, strict=True):
+            own, columns, self._down[place] = tangent_errors(direction, jacobian)
+            rows["own"][place], self._columns[place], depth = own, columns, self.depths[place]
+            width = max(columns.width, depth.columns.width)
+            counts.append((width, len(columns.places), len(depth.columns.places)))
+            own_vars.append(depth.own_var)
+        rows["tangent"][at] = tangents
+        rows["width"][at], rows["count"][at], rows["depths"][at] = np.array(counts).T
+        rows["depth_var"][at] = own_vars
+
+    def shared_depth_vars(self) -> Array:
+        """Variances (n, 3) of the positions by what their depths share, m^2; as of ``follow``, of those alone."""
+        shared = np.zeros((len(self), max(depth.columns.width for depth in self.depths)))
+        for own, depth in zip(shared, self.depths, strict=True):
+            own[depth.columns.places] = depth.columns.values[0]
+        shared = shared[:, shared.any(axis=0)]
+        along = self.rows["along"][: len(self)]
+        kinks = (along[:-1] - along[1:])[:, :, None] * shared[:-1, None]
+        found = along[:, :, None] * shared[:, None]
+        found[1:] += np.cumsum(kinks, axis=0)
+        return np.asarray(np.sum(found * found, axis=2))
+
+    def tangent_columns(self, place: int) -> Array:
+        """Shared columns (3, s) of the tangent at a station."""
+        packed = self._columns[place]
+        values = np.concatenate([packed.values, self._down[place][None]])
+        return Packed.of_values(values, packed.places, packed.width).columns()
+
+    def follow(self, sums: TrajectorySums, begin: int, end: int, *, with_columns: bool) -> Followed:
+        """Continue ``sums`` from one place to another."""
+        from groundstation.survey.well.kernels.position_errors import (
+            add_stations,  # reading alone needs no compiler
+        )
+
+        rows, columns = self.rows[begin : end + 1], self._columns[begin : end + 1]
+        depths = self.depths[begin : end + 1]
+        known = max(sums.passed.shape[1], int(rows["width"][0]))
+        widths = np.maximum(np.maximum.accumulate(rows["width"][1:]), known)
+        starts = np.concatenate([FROM_ZERO, rows["count"].cumsum()])
+        places = np.concatenate([*map(PLACES, columns)]).astype(np.intp, copy=False)
+        lean, down = (
+            np.concatenate([*map(VALUES, columns)], axis=1),
+            np.concatenate(self._down[begin : end + 1]),
+        )
+        depth_starts = np.concatenate([FROM_ZERO, rows["depths"].cumsum()])
+        depth_places = np.concatenate([*map(DEPTH_PLACES, depths)]).astype(np.intp, copy=False)
+        by_depth = np.concatenate([*map(DEPTH_VALUES, depths)], axis=1)[0]
+        alongs = rows["along"][1:].copy()
+        legs = np.diff(rows["md"])
+        ends = 0.5 * legs
+        weights = ends.copy()  # of the station before each, which has both its legs now
+        weights[0] += 0.5 * sums.length
+        weights[1:] += ends[:-1]
+        width, count = int(widths[-1]), len(ends)
+        marked = np.arange(BLOCK - begin % BLOCK, count + 1, BLOCK) - 1
+        marks, own_marks = np.empty((len(marked), 3, width)), np.empty((len(marked), 3, 3))
+        passed, own = np.zeros((3, width)), sums.own.copy()
+        passed[:, : sums.passed.shape[1]] = sums.passed
+        shared, covs = np.empty((count if with_columns else 0, 3, width)), np.empty((count, 3, 3))
+        add_stations(
+            weights, ends, starts, places, lean, down, rows["own"].copy(), rows["along"][:-1] - alongs, alongs,
+            depth_starts, depth_places, by_depth, widths, passed, np.empty_like(passed), own,
+            int(marked[0]) if len(marked) else count, BLOCK, marks, own_marks, shared, covs,
+        )  # fmt: skip
+        return Followed(
+            TrajectorySums(own, passed, float(legs[-1])),
+            [
+                TrajectorySums(own_marks[number].copy(), marks[number, :, : int(widths[k])].copy(), float(legs[k]))
+                for number, k in enumerate(marked.tolist())
+            ]
+            if len(marked)
+            else [],
+            runs_of(shared, widths) if with_columns else [],
+            covs,
+        )

@@ -1,0 +1,121 @@
+"""The figure of a wall in print, measured: columns, regions and joints of a wall that runs obliquely."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+
+from groundstation.report.plots_wall import wall_figure
+from groundstation.survey.wall.as_built import Columns
+from groundstation.survey.wall.wall_joints import Joints, judge_joints, neighbours_in_line, worst_joint
+
+RADIUS, REQUIRED, COUNT = 0.6, 0.8, 5
+DEPTHS = np.arange(0.0, 20.1, 1.0)
+COV = np.array([[4e-4, 2.5e-4], [2.5e-4, 9e-4]])  # at the toe
+SIGMA = math.sqrt(-2.0 * math.log(1.0 - 0.95))
+
+
+def wall() -> tuple[Columns, Joints]:
+    """Columns 0.75 m apart on a line to the north-east by east; the fourth leans away to the north."""
+    along = np.array([math.cos(1.1), math.sin(1.1)])
+    heads = 0.75 * np.arange(COUNT)[:, None] * along + np.array([3.0, -7.0])
+    leans = np.zeros((COUNT, 2))
+    leans[3] = 0.011, 0.004
+    centres = heads[:, None] + leans[:, None] * DEPTHS[:, None]
+    covs = np.broadcast_to(
+        (DEPTHS / DEPTHS[-1])[:, None, None] ** 2 * COV + 1e-8 * np.eye(2), (COUNT, len(DEPTHS), 2, 2)
+    )
+    names = [f"P{k + 1}" for k in range(COUNT)]
+    columns = Columns.surveyed(names, DEPTHS, centres, covs, heads, RADIUS)
+    return columns, judge_joints(columns, neighbours_in_line(COUNT, closed=False), REQUIRED)
+
+
+def panels() -> tuple[Axes, ...]:
+    """Thickness over depth, map, plan, worst joint."""
+    columns, found = wall()
+    figure = wall_figure(columns, found, REQUIRED, None, "oblique")
+    plt.close(figure)
+    return tuple(figure.axes[:4])
+
+
+def of(axes: Axes, gid: str) -> list[Any]:
+    return [artist for artist in axes.get_children() if artist.get_gid() == gid]
+
+
+def thickness(first: int, second: int) -> np.ndarray:
+    """Of a joint over depth: the common chord of two equal circles."""
+    columns, _ = wall()
+    apart = np.hypot(*np.moveaxis(columns.centres[second] - columns.centres[first], -1, 0))
+    return np.asarray(2.0 * np.sqrt(RADIUS**2 - (0.5 * apart) ** 2))
+
+
+def test_the_plan_has_every_column_where_it_is_at_the_worst_depth() -> None:
+    columns, found = wall()
+    _, depth = worst_joint(found)
+    plan = panels()[2]
+    circles = of(plan, "column")
+    np.testing.assert_allclose([one.get_center() for one in circles], columns.centres[:, depth, ::-1], atol=1e-12)
+    assert {one.get_radius() for one in circles} == {RADIUS}
+    heads = next(line for line in plan.lines if line.get_marker() == "+")
+    np.testing.assert_allclose(np.array(heads.get_data()).T, columns.designs[:, ::-1])
+    assert (plan.get_xlabel(), plan.get_ylabel()) == ("East (m)", "North (m)")
+    assert plan.get_xlim()[0] < plan.get_xlim()[1]
+    assert plan.get_ylim()[0] < plan.get_ylim()[1]
+
+
+def test_the_window_of_the_plan_is_around_the_worst_joint() -> None:
+    columns, found = wall()
+    joint, depth = worst_joint(found)
+    (window,) = [patch for patch in panels()[2].patches if not patch.get_gid()]
+    middle = columns.centres[list(found.pairs[joint]), depth].mean(axis=0)
+    assert window.get_x() + 0.5 * window.get_width() == pytest.approx(middle[1])
+    assert window.get_y() + 0.5 * window.get_height() == pytest.approx(middle[0])
+
+
+def test_regions_of_the_worst_joint_are_those_of_their_covariances() -> None:
+    columns, found = wall()
+    _, depth = worst_joint(found)
+    zoom = panels()[3]
+    circles, outlines = of(zoom, "column"), of(zoom, "ellipse")
+    assert len(outlines) == len(circles) >= 2
+    known = np.linalg.inv(columns.covs[0, depth])
+    for circle, outline in zip(circles, outlines, strict=True):
+        east, north = (outline.get_path().vertices[:-1] - circle.get_center()).T
+        off = np.stack([north, east], axis=-1)
+        np.testing.assert_allclose(np.sqrt(np.einsum("ni,ij,nj->n", off, known, off)), SIGMA, rtol=1e-6)
+    places = {tuple(np.round(one.get_center(), 9)) for one in circles}
+    assert places <= {tuple(np.round(place, 9)) for place in columns.centres[:, depth, ::-1]}
+
+
+def test_the_bar_across_the_worst_joint_is_its_thickness_and_square_to_the_centres() -> None:
+    columns, found = wall()
+    joint, depth = worst_joint(found)
+    first, second = (int(k) for k in found.pairs[joint])
+    bar = max((line for line in panels()[3].lines if line.get_linewidth() > 2.0), key=lambda line: line.get_linewidth())
+    ends = np.array(bar.get_data()).T[:, ::-1]  # north, east
+    assert np.hypot(*(ends[1] - ends[0])) == pytest.approx(thickness(first, second)[depth])
+    between = columns.centres[second, depth] - columns.centres[first, depth]
+    assert abs(float((ends[1] - ends[0]) @ between)) < 1e-12
+    np.testing.assert_allclose(ends.mean(axis=0), columns.centres[[first, second], depth].mean(axis=0))
+
+
+def test_thickness_is_drawn_over_depth_downwards_the_worst_joint_first() -> None:
+    columns, found = wall()
+    joint, depth = worst_joint(found)
+    over_depth, shades = panels()[:2]
+    first, second = (int(k) for k in found.pairs[joint])
+    np.testing.assert_allclose(over_depth.lines[0].get_xdata(), thickness(first, second), rtol=1e-9)
+    np.testing.assert_allclose(over_depth.lines[0].get_ydata(), DEPTHS)
+    required = next(line for line in over_depth.lines if "required" in str(line.get_label()))
+    assert list(required.get_xdata()) == [REQUIRED, REQUIRED]
+    for axes in (over_depth, shades):
+        assert axes.get_ylim()[0] > axes.get_ylim()[1]
+    (ring,) = of(shades, "worst")
+    assert (ring.get_xdata()[0], ring.get_ydata()[0]) == (joint, columns.depths[depth])
+    cells = np.asarray(shades.collections[0].get_array()).reshape(len(DEPTHS), COUNT - 1)
+    np.testing.assert_allclose(cells, found.probability.T)

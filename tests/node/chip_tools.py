@@ -1,0 +1,90 @@
+"""Compiling and running the step in C for its tests, and what to install where that cannot be."""
+
+import itertools
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from node.translation.chip_program import BARE
+from node.translation.toolchains import OPTIONS, TOOLCHAINS
+
+HERE = Path(__file__).parent / "chip"
+RISCV_MEMORY = ("flash=0x80000000", "flash_size=0x400000", "ram=0x80400000", "ram_size=0x1000000", "stack_size=0x8000")
+HOST = ("-std=gnu99", "-O1", "-fwrapv")
+
+
+def needs(program: str, package: str) -> pytest.MarkDecorator:
+    """Skip a test where a program is not installed, by the name of Debian's package."""
+    return pytest.mark.skipif(shutil.which(program) is None, reason=f"needs {program}: install Debian's {package}")
+
+
+needs_gcc = needs("gcc", "gcc")
+
+
+def run_program(
+    *command: str | Path, folder: Path, environment: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """What a program says."""
+    return subprocess.run(
+        list(map(str, command)), cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+
+
+def compile_replay(folder: Path, *options: str, code: str = "borechain_step.c", name: str = "replay") -> Path:
+    """The program that replays calls, for this machine, of the step that lies in ``folder``."""
+    done = run_program("gcc", *HOST, *options, "-I.", code, HERE / "replay.c", "-o", name, folder=folder)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return folder / name
+
+
+def said_numbers(text: str) -> dict[str, int]:
+    """The last numbers that the program said, by their names."""
+    words = text.split()
+    return {name: int(number) for name, number in itertools.pairwise(words) if number.isdigit()}
+
+
+def compile_for_chip(folder: Path, target: str) -> Path:
+    """The same for a bare chip in QEMU, with the instructions and the stack counted where that is an Arm."""
+    toolchain = TOOLCHAINS[target]
+    step = run_program(
+        toolchain.prefix + "gcc", *toolchain.options, *OPTIONS, "-c", "borechain_step.c", "-o", f"{target}.o",
+        folder=folder,
+    )  # fmt: skip
+    assert step.returncode == 0, step.stderr[-2000:]
+    if target == "riscv32":
+        bare = (
+            "--specs=picolibc.specs", "--oslib=semihost", "--crt0=hosted",
+            *(f"-Wl,--defsym=__{one}" for one in RISCV_MEMORY), HERE / "replay.c",
+        )  # fmt: skip
+    else:
+        bare = (
+            "--specs=rdimon.specs",
+            "-DCOUNT_ON_CHIP",
+            "-T",
+            BARE / "mps2.ld",
+            BARE / "startup.c",
+            HERE / "replay.c",
+        )
+    made = run_program(
+        toolchain.prefix + "gcc", *toolchain.options, "-O2", "-I.", *bare, f"{target}.o", "-o", f"{target}.elf",
+        folder=folder,
+    )  # fmt: skip
+    assert made.returncode == 0, made.stderr[-2000:]
+    return folder / f"{target}.elf"
+
+
+MACHINES = {
+    "cortex-m4": ("qemu-system-arm", "-M", "mps2-an386", "-icount", "shift=0"),
+    "cortex-m0plus": ("qemu-system-arm", "-M", "mps2-an385", "-icount", "shift=0"),
+    "riscv32": ("qemu-system-riscv32", "-M", "virt", "-bios", "none", "-m", "64M"),
+}
+
+
+def run_on_chip(target: str, program: Path, folder: Path) -> subprocess.CompletedProcess[str]:
+    """What the program says in QEMU; ``folder`` has its calls.bin."""
+    program_name, *machine = MACHINES[target]
+    quiet = ("-nographic", "-monitor", "none", "-serial", "null")
+    hosted = ("-semihosting-config", "enable=on,target=native")
+    return run_program(program_name, *machine, *quiet, *hosted, "-kernel", program, folder=folder)

@@ -1,0 +1,198 @@
+"""Drivers at the edge of what they read: both ends of every range, counters that wrap and jump, lost frames."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from emulated_mpu6500 import CAPACITY, EmulatedMpu6500
+
+from node.errors import SensorError
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.process.drivers.frame_clock import FrameClock
+from node.process.drivers.mpu6500 import Mpu6500
+from node.process.drivers.quadrature import LARGEST_JUMP, QuadratureFile
+from node.process.drivers.timed import TimedImu
+
+RATE, FORCE, GYRO, ACCELEROMETER = (0.0, 0.0, 1.0 * DEG), (0.2, -0.3, -9.7), 1, 2
+LIMIT = 2000.0 * DEG, 1000.0
+
+
+def driver() -> tuple[EmulatedMpu6500, Mpu6500]:
+    chip = EmulatedMpu6500()
+    made = Mpu6500(chip.connect, sleep=lambda _: None)
+    made.start()
+    return chip, made
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("flag", [GYRO, ACCELEROMETER])
+def test_one_frame_at_either_end_of_its_range_marks_its_own_sensor(flag: int, axis: int, sign: float) -> None:
+    chip, one = driver()
+    chip.live(PERIOD, RATE, FORCE)
+    assert one.read(0.0, PERIOD).saturated == 0
+    rate, force = list(RATE), list(FORCE)
+    (rate if flag == GYRO else force)[axis] = sign * LIMIT[flag - 1]
+    chip.live(0.5 * PERIOD, RATE, FORCE)
+    chip.live(0.03, tuple(rate), tuple(force))
+    chip.live(0.5 * PERIOD - 0.03, RATE, FORCE)
+    assert one.read(PERIOD, 2.0 * PERIOD).saturated == flag
+
+
+@pytest.mark.parametrize("spare", [1, 0, -1])
+def test_a_fifo_is_read_up_to_the_last_frame_that_it_holds(spare: int) -> None:
+    chip, one = driver()
+    frames = CAPACITY // 14 - spare
+    for _ in range(2):
+        chip.live(frames * 0.02 + 1e-6, RATE, FORCE)
+        end = frames * 0.02
+        if spare < 0:
+            one._fresh = False
+            with pytest.raises(SensorError, match="overflown"):
+                one.read(0.0, end)
+        else:
+            one._fresh = False
+            assert one.read(0.0, end).rate[2] == pytest.approx(RATE[2], rel=0.02)
+
+
+def test_a_count_of_exactly_the_capacity_is_no_overflow() -> None:
+    chip, one = driver()
+    chip.fifo += bytes(CAPACITY)
+    one._fresh = False
+    assert one.read(0.0, 36 * 0.02).rate == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("low_pass", "delay"), [(184, 2.9e-3), (20, 9.9e-3), (5, 33.48e-3)])
+def test_what_is_shown_is_earlier_by_the_delay_of_the_low_pass(low_pass: int, delay: float) -> None:
+    """Register map, revision 2.1, delays of the gyroscope: the motion that a frame shows was that much before it."""
+    found = {}
+    for which in (low_pass, 92):  # 3.9 ms
+        chip = EmulatedMpu6500()
+        one = Mpu6500(chip.connect, low_pass=which, sleep=lambda _: None)
+        one.start()
+        for k in range(1, 40):
+            chip.live(PERIOD, RATE, FORCE)
+            sample = one.read((k - 1) * PERIOD, k * PERIOD)
+        found[which] = sample.late
+    assert found[low_pass] - found[92] == pytest.approx(delay - 3.9e-3, abs=1e-9)
+    assert -0.011 < found[92] < 0.03  # half a frame before its end, or a frame after
+
+
+def test_a_fifo_that_overflowed_has_another_phase() -> None:
+    """Emptied at a time of its own, its frames come at another phase: what was known of the one before is of no use."""
+    chip, one = driver()
+    late = []
+    for turn in range(3):
+        for k in range(1, 30):
+            chip.live(PERIOD, RATE, FORCE)
+            sample = one.read(turn * 100.0 + (k - 1) * PERIOD, turn * 100.0 + k * PERIOD)
+        late.append(sample.late)
+        chip.live(2.0, RATE, FORCE)  # and nothing is read for two seconds
+        one._fresh = True  # as after a start, which reads what there is
+        one.read(turn * 100.0 + 50.0, turn * 100.0 + 52.0)
+        assert one._frames._reads == type(one._frames._reads)(maxlen=256)
+        assert math.isnan(one._frames.newest)
+    assert np.ptp(late) < 0.021
+
+
+PERIODS = (0.02, 0.011, 1.0 / 123.0)
+
+
+@pytest.mark.parametrize("period", PERIODS)
+def test_after_one_read_a_frame_may_have_come_at_any_time_of_its_period(period: float) -> None:
+    """Uniform over a period: its standard deviation is a square root of a twelfth of it, its middle half of it ago."""
+    clock = FrameClock(1.0 / period)
+    newest = clock.on_read(100.0, 26)
+    assert clock.std == pytest.approx(period / math.sqrt(12.0), rel=1e-6)
+    assert newest == pytest.approx(100.0 - 0.5 * period, rel=1e-9)
+    assert clock.end - clock.newest == pytest.approx(0.5 * clock.period)
+
+
+def test_the_time_of_a_frame_is_off_by_what_its_deviation_says() -> None:
+    """Truth is a crystal of its own; normalised squares have the mean of one, from both sides, over the first reads."""
+    normalised = []
+    for seed in range(200):
+        random = np.random.default_rng(seed)
+        phase, clock, count, at = random.uniform(0.0, 0.02), FrameClock(50.0), 0, 0.0
+        for _ in range(3):
+            at += PERIOD + random.uniform(0.0, 0.02)
+            total = math.floor((at - phase) / 0.02)
+            newest = clock.on_read(at, total - count)
+            count = total
+        normalised.append(((newest - (phase + 0.02 * total)) / clock.std) ** 2)
+    assert 0.4 < np.mean(normalised) < 2.0
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_lost_frames_begin_another_phase(times: int) -> None:
+    clock, at = FrameClock(50.0), 0.0
+    for turn in range(times):
+        shift = 0.007 * (turn + 1)
+        for k in range(30):
+            at += 0.53
+            frames = math.floor((at + shift) / 0.02) - math.floor((at - 0.53 + shift) / 0.02)
+            newest = clock.on_read(at, frames)
+            true = math.floor((at + shift) / 0.02) * 0.02 - shift
+            if k:
+                assert abs(newest - true) <= 0.5 * 0.02 + 1e-9
+        clock.on_read(at + 0.3, 2)  # of fifteen
+        at += 0.3
+        assert clock.std == pytest.approx(clock.period / math.sqrt(12.0), rel=1e-6)
+
+
+class Counter:
+    """A counter's file."""
+
+    def __init__(self, folder: Path, bits: int, raw: int) -> None:
+        self.path, self.span = folder / "count", 1 << bits
+        self.write(raw)
+        self.driver = QuadratureFile(self.path, bits)
+        self.driver.start()
+        self.now = 0.0
+
+    def write(self, raw: int) -> None:
+        self.path.write_text(f"{raw % self.span}\n")
+
+    def read(self, raw: int) -> tuple[int, bool]:
+        self.write(raw)
+        self.now += 0.5
+        sample = self.driver.read(self.now)
+        return sample.count, sample.rising
+
+
+@pytest.mark.parametrize("bits", [16, 32])
+@pytest.mark.parametrize("first", [3, -3, 1000])
+def test_a_counter_is_followed_through_zero_both_ways(tmp_path: Path, bits: int, first: int) -> None:
+    counter = Counter(tmp_path, bits, first)
+    total = 0
+    for step in (10, 40, -70, -5, 2000, -4000, 3):
+        total += step
+        assert counter.read(first + total) == (total, step > 0)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("beyond", [0, 1])
+def test_a_counter_jumps_by_what_a_head_can_turn_and_no_more_either_way(tmp_path: Path, sign: int, beyond: int) -> None:
+    counter = Counter(tmp_path, 32, 50_000)
+    jump = sign * (LARGEST_JUMP + beyond)
+    if beyond:
+        with pytest.raises(SensorError, match=f"got {jump}"):
+            counter.read(50_000 + jump)
+    else:
+        assert counter.read(50_000 + jump) == (jump, sign > 0)
+
+
+def test_a_recording_is_a_mean_over_any_part_of_its_rows(tmp_path: Path) -> None:
+    """Rows of unequal lengths and values; a part of a row counts by its length."""
+    times, rates = (10.0, 11.0, 13.0, 13.5), (None, 2.0, -1.0, 6.0)
+    rows = [f"{t},{0 if w is None else w},0,0,0,0,-9.8" for t, w in zip(times, rates, strict=True)]
+    (tmp_path / "imu.csv").write_text("\n".join(rows) + "\n")
+    imu = TimedImu(tmp_path / "imu.csv")
+    imu.start()
+    assert imu.read(10.0, 11.0).rate[0] == pytest.approx(2.0)
+    assert imu.read(10.25, 10.5).rate[0] == pytest.approx(2.0)
+    assert imu.read(10.5, 11.5).rate[0] == pytest.approx((0.5 * 2.0 - 0.5 * 1.0) / 1.0)
+    assert imu.read(10.9, 13.1).rate[0] == pytest.approx((0.1 * 2.0 - 2.0 * 1.0 + 0.1 * 6.0) / 2.2)

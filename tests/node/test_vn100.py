@@ -1,0 +1,141 @@
+"""A VN-100 on a serial line: a pseudo-terminal whose other end writes its lines."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import math
+import os
+import pty
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from node.errors import SensorError
+from node.process.drivers.choice import imu_source
+from node.process.drivers.recorded_imu import RecordedMeans, load_record
+from node.process.drivers.source import SafeImu
+from node.process.drivers.vn100 import Vn100, checksum
+from telemetry.messages import Severity
+from telemetry.records.record_reading import RecordReading
+
+PERIOD = 0.53
+
+
+def line_of(rate: np.ndarray, force: np.ndarray, word: str = "VNIMU") -> bytes:
+    """A line as the manual prints it: signed numbers, exclusive or of the bytes as two hex digits."""
+    numbers = [0.21, -0.1, 0.45, *force, *rate, 31.5, 101.325]
+    body = f"{word}," + ",".join(f"{v:+010.6f}" for v in numbers)
+    return f"${body}*{functools.reduce(lambda a, b: a ^ b, body.encode()):02X}\r\n".encode()
+
+
+class Line:
+    """Both ends of a serial line."""
+
+    def __init__(self) -> None:
+        self.end, other = pty.openpty()
+        self.path = Path(os.ttyname(other))
+        self._other = other
+
+    def send(self, data: bytes) -> None:
+        os.write(self.end, data)
+
+    def cut(self) -> None:
+        os.close(self._other)
+        os.close(self.end)
+
+
+@pytest.fixture
+def line() -> Iterator[Line]:
+    line = Line()
+    yield line
+    with contextlib.suppress(OSError):  # a test may have cut it
+        line.cut()
+
+
+def started(line: Line) -> Vn100:
+    source = Vn100(line.path)
+    source.start()
+    return source
+
+
+def test_it_turns_by_what_a_record_of_its_samples_does(line: Line, tmp_path: Path) -> None:
+    source = started(line)
+    asked = os.read(line.end, 100).decode().split()
+    assert [order[:-3] for order in asked] == ["$VNWRG,06,19", "$VNWRG,07,100"]
+    assert all(int(order[-2:], 16) == functools.reduce(lambda a, b: a ^ b, order[1:-3].encode()) for order in asked)
+    times = np.arange(1, 5301) / 100.0
+    rates = np.column_stack([0.01 * np.ones(5300), np.zeros(5300), 0.8 * np.sin(0.3 * times)])
+    forces = np.tile([0.2, -0.1, -9.79], (5300, 1))
+    turned = 0.0
+    for k in range(100):
+        for row in range(53 * k, 53 * k + 53):
+            line.send(line_of(rates[row], forces[row]))
+        sample = source.read(k * PERIOD, (k + 1) * PERIOD)
+        assert sample.force == pytest.approx((0.2, -0.1, -9.79))
+        assert sample.temperature == pytest.approx(31.5)
+        turned += sample.rate[2] * PERIOD
+    whole = np.vstack([np.zeros((1, 7)), np.column_stack([times, rates, forces])])
+    np.save(tmp_path / "record.npy", whole)
+    means = RecordedMeans(load_record(tmp_path / "record.npy", RecordReading()))
+    again = sum(means.mean(k * PERIOD, (k + 1) * PERIOD).rate[2] * PERIOD for k in range(99))
+    last = 0.01 * float(np.sum(rates[53 * 99 :, 2]))
+    assert math.degrees(abs(turned - again - last)) < 0.01
+
+
+def test_the_checksum_is_the_manual_s() -> None:
+    assert checksum(b"VNRRG,8") == 0x4B
+
+
+def test_a_damaged_line_is_dropped_and_a_cut_one_waits_for_its_end(line: Line) -> None:
+    source = started(line)
+    good = line_of(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 9.8]))
+    bad = good.replace(b"+00.30", b"+09.30")
+    line.send(good * 30 + bad + b"\xff\x00garbage\r\n" + good[:40])
+    assert source.read(0.0, 0.5).rate == pytest.approx((0.1, 0.2, 0.3))
+    assert source.dropped == 2
+    line.send(good[40:] + good * 29)
+    assert source.read(0.5, 1.0).rate == pytest.approx((0.1, 0.2, 0.3))
+    assert source.dropped == 2
+
+
+def test_silence_another_family_and_a_sensor_at_its_range_are_named(line: Line) -> None:
+    source = started(line)
+    good = line_of(np.array([0.0, 0.0, 35.0]), np.array([0.0, 0.0, 9.8]))
+    line.send(good * 50)
+    assert source.read(0.0, 0.5).saturated == 1
+    with pytest.raises(SensorError, match="expected about 50 lines, got 0"):
+        source.read(0.5, 1.0)
+    line.send(line_of(np.zeros(3), np.zeros(3), "VNYPR") * 50)
+    with pytest.raises(SensorError, match=r"expected lines \$VNIMU, got \$VNYPR"):
+        source.read(1.0, 1.5)
+    with pytest.raises(SensorError, match="vn100: /dev/null"):
+        Vn100(Path("/dev/null")).start()
+    with pytest.raises(SensorError, match="not started"):
+        Vn100(line.path).read(0.0, 0.5)
+    assert isinstance(imu_source(f"vn100:{line.path}"), Vn100)
+
+
+def test_a_line_that_is_pulled_out_is_told_once_and_comes_back(line: Line, tmp_path: Path) -> None:
+    port = tmp_path / "ttyUSB0"
+    port.symlink_to(line.path)
+    source = Vn100(port)
+    source.start()
+    said: list[tuple[Severity, str]] = []
+    safe = SafeImu(source, lambda severity, code, _: said.append((severity, code)))
+    good = line_of(np.zeros(3), np.array([0.0, 0.0, 9.8]))
+    line.send(good * 50)
+    assert math.isfinite(safe.read(0.0, 0.5).rate[2])
+    line.cut()
+    port.unlink()
+    assert all(math.isnan(safe.read(0.5, 1.0).rate[2]) for _ in range(4))
+    again = Line()
+    port.symlink_to(again.path)
+    assert math.isnan(safe.read(1.0, 1.5).rate[2])
+    again.send(good * 50)
+    assert math.isfinite(safe.read(1.5, 2.0).rate[2])
+    assert said == [(Severity.ERROR, "sensor_failed"), (Severity.WARNING, "sensor_back")]
+    source.close()
+    again.cut()

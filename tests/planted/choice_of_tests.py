@@ -1,0 +1,70 @@
+"""Which test files are to notice a defect: those that are named, or those that import its module, nearest first."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Collection, Iterator
+from pathlib import Path
+
+from defect_lists import Defect, DefectError
+
+COSTLY = ("processes", "studies", "page", "gauntlet", "truth", "planted", "tools")  # folders that are named, not chosen
+FEW = 3  # files; where fewer import the module itself, those are added that import who imports it
+MOST = 6  # files
+IMPORT = re.compile(r"^ *(?:from|import) ([\w.]+)(?: import ([\w, ]*))?", re.MULTILINE)
+
+
+def choose_tests(defect: Defect, root: Path) -> list[str]:
+    """Test files below ``tests/`` for a defect, the nearest first."""
+    if defect.tests:
+        for name in defect.tests:
+            if not (root / "tests" / name.partition("::")[0]).exists():
+                raise DefectError(f"{defect.name}: expected a file of tests, got {name}")
+        return list(defect.tests)
+    module = defect.file.removesuffix(".py").replace("/", ".")
+    wanted = {module}
+    chosen: list[str] = []
+    for _ in range(2):
+        chosen += _nearest_first(module, root, wanted, chosen)
+        if len(chosen) >= FEW:
+            break
+        wanted = {user for user, uses in _imports_of_sources(root).items() if uses & wanted}
+    if not chosen:
+        raise DefectError(f"{defect.name}: expected tests that import {defect.file}, found none; name them")
+    return chosen[:MOST]
+
+
+def _nearest_first(module: str, root: Path, wanted: set[str], known: Collection[str]) -> list[str]:
+    """Tests that import one of the ``wanted``: those of the module's package and name first, then of little else."""
+    package, stem = module.partition(".")[0], module.rpartition(".")[2]
+
+    def distance(test: str) -> tuple[bool, bool, int, str]:
+        return test.partition("/")[0] != package, stem not in test, len(_imports_of_tests(root)[test]), test
+
+    found = [test for test, uses in _imports_of_tests(root).items() if uses & wanted and test not in known]
+    return sorted(found, key=distance)
+
+
+@functools.cache
+def _imports_of_tests(root: Path) -> dict[str, frozenset[str]]:
+    tests = root / "tests"
+    files = [f for f in sorted(tests.rglob("test_*.py")) if f.relative_to(tests).parts[0] not in COSTLY]
+    return {f.relative_to(tests).as_posix(): frozenset(_imported(f)) for f in files}
+
+
+@functools.cache
+def _imports_of_sources(root: Path) -> dict[str, frozenset[str]]:
+    found = {}
+    for package in ("telemetry", "node", "groundstation", "sim", "borechain"):
+        for file in sorted((root / package).rglob("*.py")):
+            name = file.relative_to(root).as_posix().removesuffix(".py").replace("/", ".")
+            found[name] = frozenset(_imported(file))
+    return found
+
+
+def _imported(file: Path) -> Iterator[str]:
+    """Modules that a source imports, and the names on the line; to parse all sources would take two seconds."""
+    for module, names in IMPORT.findall(file.read_text(encoding="utf-8")):
+        yield module
+        yield from (f"{module}.{name.split()[0]}" for name in names.split(",") if name.split())

@@ -1,0 +1,95 @@
+"""The lists of planted defects are such that they can be planted; `make planted` plants them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from choice_of_tests import choose_tests
+from defect_lists import KINDS, ROOT, Defect, DefectError, read_defects, sample_of
+
+DEFECTS = read_defects()
+
+
+def test_every_defect_can_be_planted_and_has_tests_that_are_to_notice() -> None:
+    for defect in DEFECTS:
+        assert defect.planted_text(ROOT) != (ROOT / defect.file).read_text(encoding="utf-8")
+        assert choose_tests(defect, ROOT), defect.name
+
+
+def test_every_kind_is_planted_and_a_sample_has_each() -> None:
+    assert {defect.kind for defect in DEFECTS} == set(KINDS)
+    sample = sample_of(DEFECTS, 40)
+    assert len({defect.name for defect in sample}) == 40
+    assert {defect.package for defect in sample} == {defect.package for defect in DEFECTS}
+
+
+def row(**change: object) -> str:
+    fields = {"name": "n", "kind": 8, "file": "telemetry/keys.py", "old": "old", "new": "new"} | change
+    return "[[defect]]\n" + "\n".join(f"{name} = {value!r}" for name, value in fields.items()) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (row(kind=9), "n: expected a kind of 1..8, got 9"),
+        (row(new="old"), "n: expected a new text that differs"),
+        (row() + row(), "n: expected a name of its own, found it 2 times"),
+    ],
+)
+def test_a_list_that_is_wrong_is_named(tmp_path: Path, text: str, told: str) -> None:
+    (tmp_path / "one.toml").write_text(text)
+    with pytest.raises(DefectError, match=told):
+        read_defects(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["it is gone", "old and old"])
+def test_a_defect_whose_text_is_gone_or_twice_there_is_named(tmp_path: Path, text: str) -> None:
+    (tmp_path / "one.py").write_text(text)
+    with pytest.raises(DefectError, match=r"a name: expected its old text once in one\.py, found it [02] times"):
+        Defect("a name", "one", 8, "one.py", "old", "new").planted_text(tmp_path)
+
+
+def test_a_file_without_tests_is_named() -> None:
+    with pytest.raises(DefectError, match="name them"):
+        choose_tests(Defect("a name", "one", 1, "groundstation/gateway/page/static/js/plan.js", "a", "b"), ROOT)
+    with pytest.raises(DefectError, match=r"got nowhere\.py"):
+        choose_tests(Defect("a name", "one", 1, "telemetry/keys.py", "a", "b", ("nowhere.py",)), ROOT)
+
+
+HARMLESS = """
+[[defect]]
+name = "a word of a comment"
+kind = 8
+file = "telemetry/transport/nearest.py"
+old = "# s of listening before the first is chosen"
+new = "# s of waiting before the first is chosen"
+tests = ["telemetry/test_nearest.py"]
+
+[[defect]]
+name = "the farthest is chosen"
+kind = 7
+file = "telemetry/transport/nearest.py"
+old = "sender == min(self._heard, key=self._distance)"
+new = "sender == max(self._heard, key=self._distance)"
+tests = ["telemetry/test_nearest.py"]
+"""
+
+
+@pytest.mark.slow
+def test_what_is_noticed_and_what_survives_is_told_by_package_and_kind(tmp_path: Path) -> None:
+    (tmp_path / "some.toml").write_text(HARMLESS)
+    command = [sys.executable, str(ROOT / "tests/planted/run_planted.py"), "--fast", "--jobs", "1"]
+    done = subprocess.run([*command, "--lists", str(tmp_path)], capture_output=True, text=True, check=False)
+    told = done.stdout.splitlines()
+    assert done.returncode == 1, done.stderr
+    assert "   1 of   2   50 %  package some" in told
+    assert "   1 of   1  100 %  kind 7 (keeping the wrong one)" in told
+    assert told[-1] == "survives: a word of a comment (telemetry/transport/nearest.py)"
+    assert any("the farthest is chosen: found by FAILED tests/telemetry/test_nearest.py" in line for line in told)
+    (tmp_path / "some.toml").write_text(HARMLESS.replace("min(self._heard", "least(self._heard"))
+    gone = subprocess.run([*command, "--lists", str(tmp_path)], capture_output=True, text=True, check=False)
+    assert gone.returncode == 2
+    assert "the farthest is chosen: expected its old text once in telemetry/transport/nearest.py" in gone.stderr

@@ -1,0 +1,48 @@
+"""docs/first-sensor.md does what it says: its commands run, and its figures are those that come out."""
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from forked_commands import run
+
+from node.process.cluster_options import own_corrections
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs" / "first-sensor.md").read_text()
+
+
+def words_of(command: str, folder: Path) -> list[str]:
+    """A command of the page, its record from this checkout and its files into a folder."""
+    (line,) = re.findall(rf"^    borechain ({command} .*)$", PAGE, re.MULTILINE)
+    words = shlex.split(line)
+    return [
+        str(ROOT / word) if word.startswith("tests/") else str(folder / word) if word.endswith(".json") else word
+        for word in words
+    ]
+
+
+def test_the_record_is_understood_as_the_page_says(tmp_path: Path) -> None:
+    done = run(*words_of("calibrate record", tmp_path))
+    assert done.returncode == 0, done.stderr
+    said = next(line for line in PAGE.splitlines() if line.startswith("    mpu9150-imu0"))
+    assert re.fullmatch(re.escape(said.strip()).replace(r"\.\.", ".*"), done.stdout.strip())
+
+
+def test_both_sensors_come_out_as_the_page_says_and_a_node_takes_them(tmp_path: Path) -> None:
+    done = run(*words_of("calibrate rests", tmp_path), "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert f"It finds {len(found['rests'])} rests." in PAGE
+    sizes = [f"{found['before_rms']:.2f}", f"{found['residual_rms']:.3f}", f"{found['left_out_rms']:.3f}"]
+    judged = found["gyroscope"]
+    angles = [f"{judged['left_out_rms_deg']:.2f}", f"{judged['uncalibrated_rms_deg']:.1f}"]
+    says = "Gravity was read {} m/s2 wrong and is {} after, {} at rests .* come out to {} deg instead of {}\\."
+    assert re.search(says.format(*map(re.escape, [*sizes, *angles])), PAGE, re.DOTALL), (sizes, angles)
+    for sensor in ("gyroscope", "accelerometer"):
+        (taken,) = own_corrections(sensor, (tmp_path / f"{sensor}.json",), 1)
+        assert taken.matrix[0][0] == pytest.approx(1.0, abs=0.02)
