@@ -14,9 +14,9 @@ import numpy.typing as npt
 from groundstation.entry.null_values import is_null
 from groundstation.errors import SurveyError
 from groundstation.survey.files.cell_numbers import cell_numbers, decimal_sign, plain_cell
-from groundstation.survey.files.column_names import ALLOWED, TO_SI, named_columns
 from groundstation.survey.files.field_table import FieldTable
 from groundstation.survey.files.file_bytes import decode_text, read_file
+from groundstation.survey.files.survey_columns import ALLOWED, TO_SI, named_columns
 from groundstation.survey.files.text_tables import IsHeader, find_table
 from groundstation.survey.files.xlsx_files import read_xlsx
 

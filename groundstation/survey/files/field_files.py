@@ -7,11 +7,11 @@ from pathlib import Path
 
 from groundstation.errors import SurveyError
 from groundstation.survey.files.ags_files import read_ags
-from groundstation.survey.files.column_names import is_survey_header
 from groundstation.survey.files.field_table import FieldTable, TableWish
 from groundstation.survey.files.file_bytes import decode_text, read_file
 from groundstation.survey.files.las_files import read_las
 from groundstation.survey.files.station_tables import Understood, extent_words, understand_table
+from groundstation.survey.files.survey_columns import is_survey_header
 from groundstation.survey.files.survey_records import DISPLACEMENTS, DisplacementRule, read_record
 from groundstation.survey.files.text_tables import find_table
 from groundstation.survey.files.xlsx_files import read_xlsx

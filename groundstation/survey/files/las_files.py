@@ -10,9 +10,9 @@ import re
 from pathlib import Path
 
 from groundstation.errors import SurveyError
-from groundstation.survey.files.column_names import is_survey_header
 from groundstation.survey.files.field_table import FieldTable
 from groundstation.survey.files.file_bytes import decode_text
+from groundstation.survey.files.survey_columns import is_survey_header
 
 VERSIONS = ("2.0", "3.0")
 LINE = re.compile(r"([^.:]+)\.(\S*)\s*(.*)")

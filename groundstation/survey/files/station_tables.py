@@ -16,15 +16,15 @@ from groundstation.entry.entry_warning import EntryWarning
 from groundstation.entry.null_values import is_null
 from groundstation.errors import SurveyError
 from groundstation.survey.files.cell_numbers import cell_numbers, decimal_sign
-from groundstation.survey.files.column_names import (
+from groundstation.survey.files.field_table import FieldTable, TableWish
+from groundstation.survey.files.hole_choice import choose_hole
+from groundstation.survey.files.survey_columns import (
     ALLOWED,
     TO_SI,
     UNITS,
     NamedColumn,
     named_columns,
 )
-from groundstation.survey.files.field_table import FieldTable, TableWish
-from groundstation.survey.files.hole_choice import choose_hole
 from groundstation.survey.files.survey_records import STATIONS, stations_of
 from groundstation.survey.well.well_record import SurveyRecord
 

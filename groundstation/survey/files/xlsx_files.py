@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.errors import SurveyError
-from groundstation.survey.files.column_names import is_survey_header
 from groundstation.survey.files.field_table import FieldTable
+from groundstation.survey.files.survey_columns import is_survey_header
 from groundstation.survey.files.text_tables import LONGEST_TITLE, IsHeader
 
 LARGEST_BOOK = 256 * 2**20  # bytes, unpacked
