@@ -14,7 +14,7 @@
     ├── CommandError(ValueError)      an order outside the table of commands: nothing was sent
     ├── KeyFileError(ValueError)      the key of the rig is missing, open to others or none: correct the file
     ├── RadioError(InputError, ValueError)    a frequency, a soil or a pipe outside a model: the message says its range
-    ├── RecordError(InputError, ValueError)   a sensor's record that cannot be read: name its column or unit
+    ├── LoggerError(InputError, ValueError)   a sensor's record that cannot be read: name its column or unit
     └── CalibrationError(InputError, ValueError)    a record, a design or a file that gives no calibration
 """
 
@@ -61,7 +61,7 @@ class RadioError(TelemetryError, InputError, ValueError):
     """A value lies outside the model of a radio link; the message says its valid range."""
 
 
-class RecordError(TelemetryError, InputError, ValueError):
+class LoggerError(TelemetryError, InputError, ValueError):
     """A sensor's record cannot be read as it was asked; the message says where, what was expected and what came."""
 
 

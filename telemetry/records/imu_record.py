@@ -10,13 +10,13 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from telemetry.errors import RecordError
-from telemetry.records.known_columns import FIELD, FORCE, RATE, TEMPERATURE, TIME, TRIAD, UNITS, G, column_of
+from telemetry.errors import LoggerError
 from telemetry.records.logged_cells import LoggedCells, read_logged_cells
 from telemetry.records.reading_faults import rows_at_range, rows_read_twice
 from telemetry.records.record_columns import Placed, ignored_columns, place_columns
 from telemetry.records.record_reading import RecordReading
 from telemetry.records.record_stamps import Mask, RowTimes, stretches_of, times_of_rate, times_of_stamps
+from telemetry.records.sensor_columns import FIELD, FORCE, RATE, TEMPERATURE, TIME, TRIAD, UNITS, G, column_of
 
 Array = npt.NDArray[np.float64]
 AT_REST: Final = 0.15  # relative, by which the size of a force in the right unit may differ from gravity
@@ -58,7 +58,7 @@ class ImuRecord:
 
         Raises
         ------
-        RecordError
+        LoggerError
             When the record has no stamps and no rate was told.
         """
         return self._known_stamps().times
@@ -72,13 +72,13 @@ class ImuRecord:
 
         Raises
         ------
-        RecordError
+        LoggerError
             When the record has none of it; the message lists what it has.
         """
         values = {RATE: self.rate, FORCE: self.force, FIELD: self.field}[quantity]
         if values is None:
             has = ", ".join(name for name in self.placed if name != TIME)
-            raise RecordError(f"{self.name}: expected readings of the {quantity}, got a record of {has}")
+            raise LoggerError(f"{self.name}: expected readings of the {quantity}, got a record of {has}")
         return values
 
     def longest_stretch(self) -> slice:
@@ -91,7 +91,7 @@ class ImuRecord:
 
     def _known_stamps(self) -> RowTimes:
         if self.stamps is None:
-            raise RecordError(f"{self.name}: has no column of times: expected its rate (rows a second)")
+            raise LoggerError(f"{self.name}: has no column of times: expected its rate (rows a second)")
         return self.stamps
 
 
@@ -100,7 +100,7 @@ def read_imu_record(path: Path, reading: RecordReading, *, leave_out_repeats: bo
 
     Raises
     ------
-    RecordError
+    LoggerError
         When the file is no record, a column or a unit is not known, or a sensor is in another unit than told.
     """
     found = read_logged_cells(path)
@@ -108,7 +108,7 @@ def read_imu_record(path: Path, reading: RecordReading, *, leave_out_repeats: bo
     used = [k for one in placed.values() for k in one.columns]
     whole = np.all(np.isfinite(found.cells[:, used]), axis=1)
     if np.sum(whole) < FEWEST:
-        raise RecordError(f"{found.name}: expected {FEWEST} rows or more of numbers, got {int(np.sum(whole))}")
+        raise LoggerError(f"{found.name}: expected {FEWEST} rows or more of numbers, got {int(np.sum(whole))}")
     lost = tuple(int(line) for line in found.lines[~whole])
     again = np.zeros(len(found.cells) + 1, dtype=bool)
     again[list(found.again)] = True
@@ -154,7 +154,7 @@ def _stamps_of(found: LoggedCells, placed: dict[str, Placed], kept: Array, fresh
     one = placed[TIME]
     stamps = times_of_stamps(one.take(kept), one.scale, found.integers[one.columns[0]], fresh)
     if rate > 0.0 and not abs(rate * stamps.period - 1.0) < 0.1:
-        raise RecordError(f"{found.name}: rate: the stamps say {1.0 / stamps.period:.4g} Hz, told was {rate:.4g} Hz")
+        raise LoggerError(f"{found.name}: rate: the stamps say {1.0 / stamps.period:.4g} Hz, told was {rate:.4g} Hz")
     return stamps
 
 
@@ -164,13 +164,13 @@ def _taken(name: str, stamps: RowTimes | None, count: int, reading: RecordReadin
     if reading.begin <= 0.0 and math.isinf(reading.end) and not reading.without:
         return taken
     if stamps is None:
-        raise RecordError(f"{name}: from, to, without: expected times, got a record without them: tell its rate")
+        raise LoggerError(f"{name}: from, to, without: expected times, got a record without them: tell its rate")
     after = stamps.times - stamps.times[0]
     taken &= (after >= reading.begin) & (after <= reading.end)
     for begin, end in reading.without:
         taken &= (after < begin) | (after > end)
     if np.sum(taken) < FEWEST:
-        raise RecordError(f"{name}: from, to, without: expected rows of a record of {after[-1]:.1f} s, none is left")
+        raise LoggerError(f"{name}: from, to, without: expected rows of a record of {after[-1]:.1f} s, none is left")
     return taken
 
 
@@ -233,7 +233,7 @@ def _check_gravity(name: str, one: Placed, force: Array) -> None:
     size = float(np.median(np.linalg.norm(force, axis=1)))
     for right, factor in (("g", G), ("m/s2", 1.0 / G)):
         if abs(size * factor / G - 1.0) < AT_REST and UNITS[FORCE].get(one.unit) != UNITS[FORCE][right]:
-            raise RecordError(
+            raise LoggerError(
                 f"{name}: accelerometer: {','.join(one.names)} are {size / one.scale:.4g} long at the median, in "
                 f"{one.unit}: they look in {right}"
             )

@@ -20,7 +20,7 @@ from zipfile import BadZipFile
 import numpy as np
 import numpy.typing as npt
 
-from telemetry.errors import RecordError
+from telemetry.errors import LoggerError
 
 Array = npt.NDArray[np.float64]
 DELIMITERS: Final = ",;\t"  # else white space
@@ -51,15 +51,15 @@ def read_logged_cells(path: Path) -> LoggedCells:
 
     Raises
     ------
-    RecordError
+    LoggerError
         When there is no such file, it is empty or holds no rows of numbers, or two records of other columns.
     """
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise RecordError(f"{path.name}: expected a file to read, got {error.strerror}") from error
+        raise LoggerError(f"{path.name}: expected a file to read, got {error.strerror}") from error
     if not data.strip():
-        raise RecordError(f"{path.name}, line 1: expected a record, got an empty file")
+        raise LoggerError(f"{path.name}, line 1: expected a record, got an empty file")
     return _array_cells(path.name, data) if path.suffix == ".npy" else _text_cells(path.name, data)
 
 
@@ -67,7 +67,7 @@ def _array_cells(name: str, data: bytes) -> LoggedCells:
     try:
         raw = np.load(io.BytesIO(data), allow_pickle=False)
     except (ValueError, EOFError, OSError, MemoryError, TokenError, BadZipFile) as error:
-        raise RecordError(f"{name}: expected an array in the NPY format, got {error}") from error
+        raise LoggerError(f"{name}: expected an array in the NPY format, got {error}") from error
     if isinstance(raw, np.ndarray) and raw.dtype.names:
         names, kinds = raw.dtype.names, [raw.dtype[field].kind for field in raw.dtype.names]
         columns = [raw[field] for field in names] if set(kinds) <= set("fiu") and raw.ndim == 1 else []
@@ -77,7 +77,7 @@ def _array_cells(name: str, data: bytes) -> LoggedCells:
         columns = []
     if not columns or not len(columns[0]):
         got = f"{raw.dtype} {raw.shape}" if isinstance(raw, np.ndarray) else "an archive"
-        raise RecordError(f"{name}: expected rows of numbers, got {got}")
+        raise LoggerError(f"{name}: expected rows of numbers, got {got}")
     cells = np.column_stack(columns).astype(np.float64)
     cells[~np.isfinite(cells)] = np.nan
     integers, lines = tuple(kind in "iu" for kind in kinds), np.arange(1, len(cells) + 1)
@@ -90,7 +90,7 @@ def _text_cells(name: str, data: bytes) -> LoggedCells:
     comments = [line.lstrip("# ") for _, line in kept if line.startswith("#")]
     kept = [(k, line) for k, line in kept if not line.startswith("#")]
     if not kept:
-        raise RecordError(f"{name}: expected rows of numbers, got only comments")
+        raise LoggerError(f"{name}: expected rows of numbers, got only comments")
     delimiter = next((mark for mark in DELIMITERS if mark in kept[0][1]), None)
     header: list[str] = []
     if not _is_row(first := _cells_of(kept[0][1], delimiter)):
@@ -102,7 +102,7 @@ def _text_cells(name: str, data: bytes) -> LoggedCells:
     rows, lines, again, damaged = _rows_of(name, kept, delimiter, header, width)
     if len(damaged) > MOST_DAMAGED * len(rows) or not rows:
         where = f"line {damaged[0]}" if damaged else "line 1"
-        raise RecordError(f"{name}, {where}: expected rows of numbers, got {len(damaged)} lines that are none")
+        raise LoggerError(f"{name}, {where}: expected rows of numbers, got {len(damaged)} lines that are none")
     cells = np.array(rows)
     whole = np.all((cells == np.floor(cells)) | np.isnan(cells), axis=0)
     some = _sampled(kept, delimiter, width)
@@ -127,7 +127,7 @@ def _rows_of(
             row = []
             if len(cells) > 1 and not any(_has_number(cell) for cell in cells):
                 if header and cells[:width] != header:
-                    raise RecordError(
+                    raise LoggerError(
                         f"{name}, line {k}: expected the columns {','.join(header)}, got a second line of names, "
                         f"{','.join(cells)}: these are two records"
                     ) from None
@@ -146,7 +146,7 @@ def _usual_width(name: str, kept: list[tuple[int, str]], delimiter: str | None, 
     widths = Counter(len(_cells_of(line, delimiter)) for _, line in kept[:: max(1, len(kept) // 200)])
     width = widths.most_common(1)[0][0] if widths else len(header)
     if header and width > len(header):
-        raise RecordError(f"{name}, line {kept[0][0]}: expected {len(header)} numbers, one of each name, got {width}")
+        raise LoggerError(f"{name}, line {kept[0][0]}: expected {len(header)} numbers, one of each name, got {width}")
     return width
 
 

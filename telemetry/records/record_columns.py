@@ -8,8 +8,10 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from telemetry.errors import RecordError
-from telemetry.records.known_columns import (
+from telemetry.errors import LoggerError
+from telemetry.records.logged_cells import LoggedCells
+from telemetry.records.record_reading import SENSOR_KEYS, RecordReading, scale_of
+from telemetry.records.sensor_columns import (
     COUNTS,
     FIELD,
     FORCE,
@@ -23,8 +25,6 @@ from telemetry.records.known_columns import (
     Column,
     column_of,
 )
-from telemetry.records.logged_cells import LoggedCells
-from telemetry.records.record_reading import SENSOR_KEYS, RecordReading, scale_of
 
 Array = npt.NDArray[np.float64]
 OWN_NAMES: Final = ("time", "wx", "wy", "wz", "fx", "fy", "fz", "temperature")  # of a node's recording, by width
@@ -56,7 +56,7 @@ def place_columns(found: LoggedCells, reading: RecordReading) -> dict[str, Place
 
     Raises
     ------
-    RecordError
+    LoggerError
         When a sensor lacks an axis, its axes have different units, its unit is not told or contradicts what is told.
     """
     columns = [column_of(name) if name != SKIPPED else None for name in _names(found, reading)]
@@ -75,9 +75,9 @@ def place_columns(found: LoggedCells, reading: RecordReading) -> dict[str, Place
         placed[quantity] = _triad(found, quantity, triad, columns, reading)
     for quantity, key in SENSOR_KEYS.items():
         if reading.told_unit(quantity) and quantity not in placed:
-            raise RecordError(f"{found.name}: {key}: expected columns of the {quantity}, got {_listed(found, reading)}")
+            raise LoggerError(f"{found.name}: {key}: expected columns of the {quantity}, got {_listed(found, reading)}")
     if not set(placed) & set(SENSOR_KEYS):
-        raise RecordError(
+        raise LoggerError(
             f"{found.name}: expected columns of a sensor such as time_s,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g; got "
             f"{_listed(found, reading)}; name them in the order of the file: columns=time_s,gx_dps,.. (- is not used)"
         )
@@ -94,7 +94,7 @@ def _names(found: LoggedCells, reading: RecordReading) -> tuple[str, ...]:
     width = found.cells.shape[1]
     if reading.columns:
         if len(reading.columns) != width:
-            raise RecordError(
+            raise LoggerError(
                 f"{found.name}: columns: expected {width} names, one of each column, got {len(reading.columns)}"
             )
         return reading.columns
@@ -104,7 +104,7 @@ def _names(found: LoggedCells, reading: RecordReading) -> tuple[str, ...]:
         return OWN_NAMES[:width]
     if width == 3:
         return ("x", "y", "z")
-    raise RecordError(
+    raise LoggerError(
         f"{found.name}: expected names of its {width} columns: columns=time_s,gx_dps,.. in their order (- is not used)"
     )
 
@@ -127,7 +127,7 @@ def _single(found: LoggedCells, quantity: str, at: int, columns: list[Column | N
     if column.odd or unit not in UNITS[quantity]:
         got = column.odd or unit or "whole numbers without a unit"
         known = ", ".join(UNITS[quantity])
-        raise RecordError(f"{found.name}: column {column.name}: expected a {quantity} in {known}, got {got}")
+        raise LoggerError(f"{found.name}: column {column.name}: expected a {quantity} in {known}, got {got}")
     return Placed(quantity, (at,), (column.name,), unit, UNITS[quantity][unit])
 
 
@@ -144,15 +144,15 @@ def _triad(
 ) -> Placed:
     names = tuple(column.name for k in sorted(at) if (column := columns[at[k]]) is not None)
     if missing := [axis for k, axis in enumerate("xyz") if k not in at]:
-        raise RecordError(f"{found.name}: {quantity}: expected three axes, got {','.join(names)}: no {missing[0]}")
+        raise LoggerError(f"{found.name}: {quantity}: expected three axes, got {','.join(names)}: no {missing[0]}")
     chosen = [column for k in range(3) if (column := columns[at[k]]) is not None]
     if odd := [column for column in chosen if column.odd]:
         known = ", ".join(UNITS[quantity])
-        raise RecordError(f"{found.name}: column {odd[0].name}: expected a unit, {known} or counts, got {odd[0].odd}")
+        raise LoggerError(f"{found.name}: column {odd[0].name}: expected a unit, {known} or counts, got {odd[0].odd}")
     units = {column.unit for column in chosen}
     if len(units) > 1:
         told = ", ".join(f"{column.name} in {column.unit or 'no unit'}" for column in chosen)
-        raise RecordError(f"{found.name}: {quantity}: expected one unit of its three axes, got {told}")
+        raise LoggerError(f"{found.name}: {quantity}: expected one unit of its three axes, got {told}")
     where = (at[0], at[1], at[2])
     unit, scale = _unit(found, quantity, where, chosen, reading)
     return Placed(quantity, where, names, unit, scale)
@@ -171,18 +171,18 @@ def _unit(
     if own and own != COUNTS and chosen[0].quantity != TRIAD and not by_stem:
         scale, words = scale_of(quantity, own)
         if told and scale_of(quantity, told) != (scale, words):
-            raise RecordError(f"{found.name}: {key}: the file says {names} in {own}, told was {told}")
+            raise LoggerError(f"{found.name}: {key}: the file says {names} in {own}, told was {told}")
         return words, scale
     if told or (by_stem and own != COUNTS):
         scale, words = scale_of(quantity, told or own)
         if whole and told and scale == UNITS[quantity][scale_of(quantity, told)[1].split()[-1]]:
-            raise RecordError(
+            raise LoggerError(
                 f"{found.name}: {quantity}: {names} are whole numbers, counts of a converter: expected {key}= with "
                 f"their scale as '{TYPICAL[quantity]}', got '{told}'"
             )
         return words, scale
     what = "counts" if own == COUNTS or whole else "numbers without a unit"
-    raise RecordError(
+    raise LoggerError(
         f"{found.name}: {quantity}: {names} are {what}: expected {key}= with "
         + (f"their scale, as '{TYPICAL[quantity]}'" if what == "counts" else f"their unit, as '{_example(quantity)}'")
     )
@@ -195,7 +195,7 @@ def _example(quantity: str) -> str:
 def _told_quantity(found: LoggedCells, reading: RecordReading, placed: dict[str, Placed]) -> str:
     told = [quantity for quantity in SENSOR_KEYS if reading.told_unit(quantity) and quantity not in placed]
     if len(told) != 1:
-        raise RecordError(
+        raise LoggerError(
             f"{found.name}: columns x,y,z: expected what they are, gyro=UNIT, accel=UNIT or mag=UNIT, as "
             f"gyro='{TYPICAL[RATE]}'"
         )

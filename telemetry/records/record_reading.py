@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from telemetry.errors import RecordError
-from telemetry.records.known_columns import FIELD, FORCE, RATE, UNITS, unit_of
+from telemetry.errors import LoggerError
+from telemetry.records.sensor_columns import FIELD, FORCE, RATE, UNITS, unit_of
 
 KEYS: Final = {"columns", "gyro", "accel", "mag", "rate", "from", "to", "without"}
 SENSOR_KEYS: Final = {RATE: "gyro", FORCE: "accel", FIELD: "mag"}
@@ -49,7 +49,7 @@ def scale_of(quantity: str, text: str) -> tuple[float, str]:
 
     Raises
     ------
-    RecordError
+    LoggerError
         When it is not a positive number and a unit of the quantity.
     """
     number, unit = _split_number(text)
@@ -57,7 +57,7 @@ def scale_of(quantity: str, text: str) -> tuple[float, str]:
     known = unit_of(quantity, unit, name) if unit else ""
     if known not in UNITS.get(quantity, {}) or not 0.0 < number < math.inf:
         example = next(iter(UNITS.get(quantity, {"m/s2": 1.0})))
-        raise RecordError(f"{name}: expected a scale and a unit as '0.05 {example}', or a unit, got {text!r}")
+        raise LoggerError(f"{name}: expected a scale and a unit as '0.05 {example}', or a unit, got {text!r}")
     return number * UNITS[quantity][known], known if number == 1.0 else f"{number:g} {known}"
 
 
@@ -66,7 +66,7 @@ def read_told(text: str) -> tuple[Path, RecordReading]:
 
     Raises
     ------
-    RecordError
+    LoggerError
         When a key is unknown or its value cannot be read.
     """
     name, _, told = text.partition("?")
@@ -75,7 +75,7 @@ def read_told(text: str) -> tuple[Path, RecordReading]:
     pairs = [pair.partition("=") for pair in told.split(";") if pair.strip()]
     values = {key.strip(): value.strip() for key, _, value in pairs}
     if unknown := sorted(set(values) - KEYS):
-        raise RecordError(f"{name}: expected {', '.join(sorted(KEYS))}, got {unknown[0]}")
+        raise LoggerError(f"{name}: expected {', '.join(sorted(KEYS))}, got {unknown[0]}")
     return Path(name), reading_of(
         values.get("columns", ""),
         values.get("gyro", ""),
@@ -102,16 +102,16 @@ def reading_of(
 
     Raises
     ------
-    RecordError
+    LoggerError
         When a value cannot be meant; the message names it.
     """
     for quantity, text in ((RATE, gyro), (FORCE, accel), (FIELD, mag)):
         if text:
             scale_of(quantity, text)
     if not 0.0 <= rate < math.inf:
-        raise RecordError(f"rate: expected rows a second, got {rate:g}")
+        raise LoggerError(f"rate: expected rows a second, got {rate:g}")
     if not begin < end:
-        raise RecordError(f"from, to: expected a moment and a later one, got {begin:g} and {end:g} s")
+        raise LoggerError(f"from, to: expected a moment and a later one, got {begin:g} and {end:g} s")
     names = tuple(name.strip() for name in columns.split(",")) if columns else ()
     return RecordReading(names, gyro, accel, mag, rate, begin, end, tuple(_stretch(text) for text in without))
 
@@ -127,12 +127,12 @@ def _number(name: str, text: str) -> float:
     try:
         return float(text)
     except ValueError as error:
-        raise RecordError(f"{name}: expected a number, got {text!r}") from error
+        raise LoggerError(f"{name}: expected a number, got {text!r}") from error
 
 
 def _stretch(text: str) -> tuple[float, float]:
     first, dots, last = text.partition("..")
     begin, end = _number("without", first), _number("without", last)
     if not dots or not begin < end:
-        raise RecordError(f"without: expected seconds as 120..130, got {text!r}")
+        raise LoggerError(f"without: expected seconds as 120..130, got {text!r}")
     return begin, end

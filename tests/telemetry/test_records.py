@@ -13,11 +13,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from telemetry.errors import InputError, RecordError
+from telemetry.errors import InputError, LoggerError
 from telemetry.records.imu_record import ImuRecord, read_imu_record
-from telemetry.records.known_columns import column_of
 from telemetry.records.record_reading import read_told
 from telemetry.records.record_stamps import times_of_stamps
+from telemetry.records.sensor_columns import column_of
 from telemetry.records.understood_record import understood_line, understood_object
 
 NAMES = "time_s,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g,temperature_c"
@@ -48,7 +48,7 @@ def read(folder: Path, content: str | np.ndarray, told: str = "", **options: boo
 
 
 def refusal(folder: Path, content: str | np.ndarray, told: str = "") -> str:
-    with pytest.raises(RecordError) as refused:
+    with pytest.raises(LoggerError) as refused:
         read(folder, content, told)
     return str(refused.value)
 
@@ -194,14 +194,14 @@ def test_a_wrong_use_is_refused_by_name_and_unit(tmp_path: Path, names: str, tol
 
 
 def test_what_is_no_file_is_refused_by_name(tmp_path: Path) -> None:
-    assert issubclass(RecordError, InputError)
-    with pytest.raises(RecordError, match=r"none\.csv: expected a file to read"):
+    assert issubclass(LoggerError, InputError)
+    with pytest.raises(LoggerError, match=r"none\.csv: expected a file to read"):
         read_imu_record(*read_told(str(tmp_path / "none.csv")))
     for content in ("", "\n \n", "# nothing\n", NAMES, f"{NAMES}\nfoo,bar\n"):
         assert refusal(tmp_path, content).startswith("log.csv")
     for data in (b"\x93NUMPY no", b"PK\x03\x04" + bytes(60)):
         (tmp_path / "log.npy").write_bytes(data)
-        with pytest.raises(RecordError, match=r"log\.npy: expected an array in the NPY format"):
+        with pytest.raises(LoggerError, match=r"log\.npy: expected an array in the NPY format"):
             read_imu_record(*read_told(str(tmp_path / "log.npy")))
     for array in (np.ones((5, 8), dtype=complex), np.ones(30), np.ones((0, 8))):
         assert "expected rows of numbers" in refusal(tmp_path, array)
@@ -375,7 +375,7 @@ def test_no_bytes_raise_anything_but_the_error_of_a_record(data: bytes) -> None:
             (Path(folder) / name).write_bytes(data)
             try:
                 read_imu_record(*read_told(str(Path(folder) / name)))
-            except RecordError as error:
+            except LoggerError as error:
                 assert str(error).startswith("log.")  # noqa: PT017
 
 

@@ -20,9 +20,9 @@ from groundstation.calibration.laboratory_tables import check_range
 from groundstation.report.calibration_sheets import allan_sheet
 from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome, naming_file
 from groundstation.report.calibrations.calibration_request import AllanRequest, RecordWords
-from telemetry.errors import RecordError
+from telemetry.errors import LoggerError
 from telemetry.records.imu_record import ImuRecord, has_bare_triad, read_imu_record
-from telemetry.records.known_columns import FIELD, FORCE, RATE, UNITS, known_unit
+from telemetry.records.sensor_columns import FIELD, FORCE, RATE, UNITS, known_unit
 from telemetry.records.understood_record import understood_line, understood_object
 
 
@@ -31,7 +31,7 @@ def answer_allan(request: AllanRequest, day: str) -> CalibrationOutcome:
 
     Raises
     ------
-    CalibrationError, RecordError
+    CalibrationError, LoggerError
         The file and line, what was expected and what came.
     """
     record, found, unit = static_readings(request)
@@ -81,7 +81,7 @@ def static_readings(request: AllanRequest) -> tuple[ImuRecord, npt.NDArray[np.fl
 
     Raises
     ------
-    RecordError
+    LoggerError
         When the record cannot be read so.
     CalibrationError
         When a reading is at its full scale.
@@ -95,7 +95,7 @@ def static_readings(request: AllanRequest) -> tuple[ImuRecord, npt.NDArray[np.fl
     unit = request.unit or record.placed[sensor].unit.split()[-1]
     known = known_unit(sensor, unit)
     if known not in UNITS[sensor]:
-        raise RecordError(f"unit: expected one of the {sensor}, {', '.join(UNITS[sensor])}, got {unit!r}")
+        raise LoggerError(f"unit: expected one of the {sensor}, {', '.join(UNITS[sensor])}, got {unit!r}")
     readings = values / UNITS[sensor][known]
     for k in np.flatnonzero(np.any(np.abs(readings) >= request.full_scale, axis=1))[:1]:
         names = list(record.placed[sensor].names)

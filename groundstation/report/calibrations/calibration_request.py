@@ -106,7 +106,7 @@ class RecordWords:
 
         Raises
         ------
-        RecordError
+        LoggerError
             When a word cannot be meant; the message names it.
         """
         from telemetry.records.record_reading import reading_of

@@ -31,7 +31,7 @@ def answer_rests(request: RestsRequest, day: str) -> CalibrationOutcome:
 
     Raises
     ------
-    CalibrationError, RecordError
+    CalibrationError, LoggerError
         The file and line, what was expected and what came.
     """
     record = read_imu_record(request.file, request.words.to_reading(request.rate), leave_out_repeats=True)

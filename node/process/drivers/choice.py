@@ -12,7 +12,7 @@ from node.process.drivers.replay_drivers import ReplayEncoder, ReplayImu
 from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.drivers.timed import TimedEncoder, TimedImu
 from node.process.drivers.vn100 import Vn100
-from telemetry.errors import RecordError
+from telemetry.errors import LoggerError
 from telemetry.records.record_reading import RecordReading, read_told
 
 IMU_FORMS = "replay:FILE, timed:FILE, iio:NAME, vn100:DEVICE, mpu6500:BUS or mpu6500:BUS:ADDRESS"
@@ -77,7 +77,7 @@ def told_recording(option: str, text: str) -> tuple[Path, RecordReading]:
     """
     try:
         path, reading = read_told(text)
-    except RecordError as error:
+    except LoggerError as error:
         raise NodeConfigurationError(f"{option}: {error}") from error
     return recording_path(option, str(path)), reading
 

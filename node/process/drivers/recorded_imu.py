@@ -16,11 +16,11 @@ import numpy.typing as npt
 from node.errors import SensorError
 from node.kernels.sensors.correction import USUAL
 from node.process.drivers.source import ImuSample
-from telemetry.errors import RecordError
+from telemetry.errors import LoggerError
 from telemetry.records.imu_record import ImuRecord, read_imu_record
-from telemetry.records.known_columns import FORCE, RATE
 from telemetry.records.record_columns import OWN_NAMES
 from telemetry.records.record_reading import RecordReading
+from telemetry.records.sensor_columns import FORCE, RATE
 from telemetry.records.understood_record import NO_FAULT, fault_phrases, understood_line
 
 Array = npt.NDArray[np.float64]
@@ -51,7 +51,7 @@ def load_record(path: Path, reading: RecordReading) -> NodeRecord:
         record = read_imu_record(path, reading)
         columns = [record.triad(RATE), record.triad(FORCE)]
         times = record.times()
-    except RecordError as error:
+    except LoggerError as error:
         raise SensorError(str(error)) from error
     if record.temperature is not None:
         columns.append(record.temperature[:, None])

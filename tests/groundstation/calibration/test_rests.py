@@ -13,7 +13,7 @@ from groundstation.calibration.block import from_json
 from groundstation.report.calibrations.calibration_answer import answer_calibration
 from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome
 from groundstation.report.calibrations.calibration_request import RecordWords, RestsRequest
-from telemetry.errors import CalibrationError, RecordError
+from telemetry.errors import CalibrationError, LoggerError
 
 REAL = Path(__file__).parents[2] / "data" / "records" / "mpu9150-imu0-100hz.npy"
 REAL_WORDS = RecordWords(gyro=f"{2000 / 32768} deg/s", accel=f"{9.81 / 2048} m/s2")
@@ -141,5 +141,5 @@ def test_what_gives_no_calibration_is_refused_by_name(tmp_path: Path, rows: np.n
 
 
 def test_a_record_in_g_that_says_so_not_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RecordError, match="they look in g"):
+    with pytest.raises(LoggerError, match="they look in g"):
         calibrated(tmp_path, laid_down() / np.array([1, 1, 1, 1, G, G, G]))

@@ -10,7 +10,7 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from telemetry.errors import RecordError
+from telemetry.errors import LoggerError
 
 G: Final = 9.80665  # m/s^2
 DEG: Final = math.pi / 180.0
@@ -86,13 +86,13 @@ def unit_of(quantity: str, text: str, name: str) -> str:
 
     Raises
     ------
-    RecordError
+    LoggerError
         When the quantity has no such unit; the message lists those that it has.
     """
     if found := known_unit(quantity, text):
         return found
     known = ", ".join(UNITS.get(quantity, {}))
-    raise RecordError(f"{name}: expected a unit of the {quantity}, {known} or counts, got {text!r}")
+    raise LoggerError(f"{name}: expected a unit of the {quantity}, {known} or counts, got {text!r}")
 
 
 def known_unit(quantity: str, text: str) -> str:
