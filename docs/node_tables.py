@@ -44,6 +44,11 @@ PERIODS: Final = {"5 minutes": 300.0, "1 hour": 3600.0, "8 hours": 28800.0, "1 d
 SIGMAS_DEG: Final = (0.01, 0.02, 0.05, 0.1)
 
 
+def in_cell(text: str) -> str:
+    """A text as a cell of a table may hold it, whose borders are bars."""
+    return text.replace("|", "&#124;")
+
+
 @functools.cache
 def comments_of(source: str) -> dict[str, dict[str, str]]:
     """Comments behind the fields of every record type of a module: by name of the type and of the field."""
@@ -52,7 +57,7 @@ def comments_of(source: str) -> dict[str, dict[str, str]]:
         if isinstance(node, ast.AnnAssign) and isinstance(node.value, ast.Call) and node.value.args:
             fields = [f for f in getattr(node.value.args[0], "elts", []) if isinstance(f, ast.Tuple)]
             found[ast.unparse(node.target)] = {
-                ast.literal_eval(field.elts[0]): lines[(field.end_lineno or 0) - 1].partition("#")[2].strip()
+                ast.literal_eval(field.elts[0]): in_cell(lines[(field.end_lineno or 0) - 1].partition("#")[2].strip())
                 for field in fields
             }
     return found

@@ -62,7 +62,7 @@ class FileEnd:
     """The last mark of a file that was closed, with nothing behind it."""
 
 
-class RecordError(ValueError):
+class DamagedRecordError(ValueError):
     """A record is not as it was written."""
 
 
@@ -75,7 +75,7 @@ def read_checked(content: mmap.mmap | bytes) -> Iterator[McapRecord | DamagedByt
     while position < len(content):
         try:
             record, behind = _record_at(content, position)
-        except RecordError as error:
+        except DamagedRecordError as error:
             found = _next_chunk(content, position + 1)
             if found is not None or not _is_cut(content, position):
                 is_damaged = True
@@ -90,7 +90,7 @@ def read_checked(content: mmap.mmap | bytes) -> Iterator[McapRecord | DamagedByt
             elif not (is_damaged and isinstance(record, DataEnd)):  # the whole section's checksum says nothing new
                 _check_sums(content, position, record)
                 yield record
-        except RecordError as error:
+        except DamagedRecordError as error:
             is_damaged = True
             yield DamagedBytes(position, str(error))
         position = behind
@@ -104,13 +104,13 @@ def unpack_chunk(chunk: Chunk) -> list[McapRecord]:
 
     Raises
     ------
-    RecordError
+    DamagedRecordError
     """
     size = chunk.uncompressed_size
     if size > LARGEST_RECORD:
-        raise RecordError(f"a chunk of at most {LARGEST_RECORD} bytes, got one of {size}")
+        raise DamagedRecordError(f"a chunk of at most {LARGEST_RECORD} bytes, got one of {size}")
     if chunk.compression not in ("", "zstd"):
-        raise RecordError(f"a chunk packed by zstd, got {chunk.compression!r:.40}")
+        raise DamagedRecordError(f"a chunk packed by zstd, got {chunk.compression!r:.40}")
     try:
         if chunk.compression == "zstd":
             with zstandard.ZstdDecompressor(max_window_size=LARGEST_RECORD).stream_reader(chunk.data) as reader:
@@ -118,13 +118,13 @@ def unpack_chunk(chunk: Chunk) -> list[McapRecord]:
         else:
             data = chunk.data
     except zstandard.ZstdError as error:
-        raise RecordError("a chunk that can be unpacked") from error
+        raise DamagedRecordError("a chunk that can be unpacked") from error
     if len(data) != size or (chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc):
-        raise RecordError("the chunk that its checksum is of")
+        raise DamagedRecordError("the chunk that its checksum is of")
     try:
         return breakup_chunk(Chunk("", data, chunk.message_end_time, chunk.message_start_time, 0, size))
     except Exception as error:
-        raise RecordError("records in a chunk") from error
+        raise DamagedRecordError("records in a chunk") from error
 
 
 def channels_at_end(content: mmap.mmap | bytes) -> dict[int, Channel]:
@@ -139,7 +139,7 @@ def channels_at_end(content: mmap.mmap | bytes) -> dict[int, Channel]:
             record, position = _record_at(content, position)
             if isinstance(record, Channel):
                 found[record.id] = record
-    except RecordError:
+    except DamagedRecordError:
         return {}
     return found
 
@@ -148,10 +148,10 @@ def _record_at(content: mmap.mmap | bytes, position: int) -> tuple[McapRecord, i
     """The record at a position, and where the next one begins."""
     head = content[position : position + HEAD.size] if position >= 0 else b""
     if len(head) < HEAD.size:
-        raise RecordError("a record")
+        raise DamagedRecordError("a record")
     opcode, length = HEAD.unpack(head)
     if opcode not in LAYOUTS or length > LARGEST_RECORD:
-        raise RecordError("a record of a known kind and length")
+        raise DamagedRecordError("a record of a known kind and length")
     behind = position + HEAD.size + length
     body = content[position + HEAD.size : behind]
     stream = ReadDataStream(BytesIO(body))
@@ -159,9 +159,9 @@ def _record_at(content: mmap.mmap | bytes, position: int) -> tuple[McapRecord, i
     try:
         record = kind.read(stream, length) if opcode == Opcode.MESSAGE else kind.read(stream)
     except Exception as error:
-        raise RecordError(f"a whole {kind.__name__}") from error
+        raise DamagedRecordError(f"a whole {kind.__name__}") from error
     if len(body) != length or stream.count != length:
-        raise RecordError(f"a whole {kind.__name__}")
+        raise DamagedRecordError(f"a whole {kind.__name__}")
     return record, behind
 
 
@@ -169,11 +169,11 @@ def _check_sums(content: mmap.mmap | bytes, position: int, record: McapRecord) -
     """Compare the checksum of the data section, or of the tables at the end, where one was written."""
     if isinstance(record, DataEnd) and record.data_section_crc:
         if _sum_of(content, 0, position) != record.data_section_crc:
-            raise RecordError("the data section that its checksum is of")
+            raise DamagedRecordError("the data section that its checksum is of")
     elif isinstance(record, Footer) and record.summary_crc:
         start = record.summary_start or position
         if _sum_of(content, start, position + FOOTER_CHECKED) != record.summary_crc:
-            raise RecordError("the tables that the footer's checksum is of")
+            raise DamagedRecordError("the tables that the footer's checksum is of")
 
 
 def _sum_of(content: mmap.mmap | bytes, start: int, end: int) -> int:
@@ -193,7 +193,7 @@ def _next_chunk(content: mmap.mmap | bytes, start: int) -> int | None:
             if isinstance(record, Chunk):
                 unpack_chunk(record)
                 return at - TO_COMPRESSION
-        except RecordError:
+        except DamagedRecordError:
             pass
         at += 1
     return None

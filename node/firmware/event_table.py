@@ -238,6 +238,17 @@ EVENT_TABLE: Final[dict[Code, EventSpec]] = {
         "the encoder counts against the gyroscope, as fast; while the head turns its aidings are not used",
         (("encoder_dps", float), ("spin_dps", float)),
     ),
+    Code.ENCODER_STANDS: EventSpec(
+        "encoder_stands",
+        Severity.ERROR,
+        "the encoder tells of a head at rest while the gyroscope goes on turning; until it counts again it is not used",
+        (("spin_dps", float),),
+    ),
+    Code.AXES_EXCHANGED: EventSpec(
+        "axes_exchanged",
+        Severity.ERROR,
+        "gravity goes around against the gyroscope: x and y of the sensors are exchanged; the node exchanges them back",
+    ),
 }
 
 

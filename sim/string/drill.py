@@ -100,7 +100,7 @@ def drill_string(
         if not schedule.locked:
             hand_down(aid, integers, nodes, schedule, hops, shifts, memory.aiding, cycle, estimates)
         is_told, top = False, powered[cycle]
-        for k in range(top):
+        for k in range(top if schedule.is_run[cycle] else 0):
             set_moment(schedule, shifts, moment, cycle, k)
             says = step_node(step, integers, records, settings, corrections[k], readings[k], moment, k)
             if estimates is not None:

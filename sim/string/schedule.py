@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from node.kernels.arithmetic.formats import PERIOD
+from sim.world.disturbance.lost_cycles import are_run
 from sim.world.random_streams import RandomStream, random_stream
 from sim.world.scenario_file import AidingSection
 from sim.world.world import World
@@ -28,6 +29,7 @@ class StringSchedule(NamedTuple):
     clock_var: Array  # (hops,) s^2, of rig time, as a node states it
     measured: Array  # (cycles, AIDING) by the encoder
     is_sent: Mask  # (cycles,) whether that goes down the string
+    is_run: Mask  # (cycles,) whether the nodes run it
     dated_late: Array  # (hops,) s, by which a node takes an aiding to be valid too late
     locked: bool  # what is measured arrives after the cycles that end with the encoder's, else before
 
@@ -47,6 +49,7 @@ def schedule_of(world: World, measured: Array) -> StringSchedule:
         clock_var=(1e-3 * stated) ** 2 * np.arange(1.0, count + 1.0),
         measured=measured,
         is_sent=is_sent(world),
+        is_run=are_run(file, ends),
         dated_late=lateness_of(world),
         locked=file.encoder.phase == "locked",
     )

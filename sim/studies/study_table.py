@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from sim.named import by_name
 from sim.studies import table_columns
-from sim.studies.field.cases import ALL, KEYS
+from sim.studies.field.cases import ALL
+from sim.studies.field.field_rows import KEYS
 from sim.studies.study import MODULES, Option, ResultTable, Study
 
 SEEDS = Option("seeds", 40, 2, 10_000)
@@ -203,7 +204,16 @@ STUDIES = by_name(
             "field",
             "What a node makes of a field's world, disturbance by disturbance: honesty, flags, false faults, surveys.",
             f"{MODULES}.field",
-            (ResultTable("Field, {seeds} seeds", table_columns.FIELD, table_columns.FIELD),),
+            (
+                ResultTable("Field, {seeds} seeds", table_columns.FIELD, table_columns.FIELD_SHOWN),
+                ResultTable(
+                    "Field with drawn constants, {seeds} seeds",
+                    table_columns.FIELD_SHOWN,
+                    table_columns.FIELD_SHOWN,
+                    rows="third",
+                    suffix="-drawn",
+                ),
+            ),
             (Option("disturbance", ALL, choices=KEYS), Option("seeds", 20, 2, 10_000)),
             drawn=False,
             full=("--seeds 100",),

@@ -240,6 +240,12 @@ FIELD: Columns = (
     ("azimuth_rms_deg", "azimuth rms, deg"),
     ("reached", "reached"),
 )
+FIELD_SHOWN: Columns = (
+    *FIELD,
+    ("sharpness_turning", "sigma over error turning"),
+    ("sharpness_rest", "at rest"),
+    ("sharp", "sharp"),
+)
 PROJECTION: Columns = (
     ("case", "from"),
     ("inside_percent", "inside the cone of 95 %, %"),

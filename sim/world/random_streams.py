@@ -53,6 +53,7 @@ class RandomStream(IntEnum):
     PATHS = 2001  # a hole of a kind, for the projection
     TURN_TABLE = 3001  # a gyroscope and its table
     ROBOT_ARM = 3002  # an accelerometer and its arm
+    FIELD = 3003  # constants of a disturbance that a study draws, and a bad day
     LINK = 0xA1  # fate and delays of the frames of one port
 
 

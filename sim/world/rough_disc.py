@@ -7,6 +7,7 @@ direction. What jumps is the counter and not the disc, so no edge belongs to it.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +31,7 @@ class RoughDisc:
     errors : (counts,) rad, of each line's place
     seed : of the run
     zero : rad, angle of the head at which its count is 0
+    disturbed : what the disc shows (n,) rad, of what it would
     """
 
     def __init__(
@@ -42,13 +44,14 @@ class RoughDisc:
         seed: int,
         *,
         zero: float = 0.0,
+        disturbed: Callable[[Array], Array] = np.asarray,
     ) -> None:
         self._section, self._begin, self._t = section, begin, t
         self._errors, self._quantum = errors, math.tau / len(errors)
         random = random_stream(seed, RandomStream.ROUGH_ENCODER)
         self._phase, self._outliers = float(random.uniform(0.0, math.tau)), seed
         self._head = head
-        self.shown = self._shown(head) - zero
+        self.shown = disturbed(self._shown(head)) - zero
         self._counts = self._counts_at(self.shown)
         self._first = int(self._counts[0])
         self._edges, self._after, self._rising = self._find_edges()
@@ -61,13 +64,13 @@ class RoughDisc:
         k = int(np.searchsorted(self._edges, t, side="right")) - 1
         off = self._offset(t)
         if k < 0:
-            return self._first + off, self._begin, 1, ()
+            return self._counted(self._first + off), self._begin, 1, ()
         rising = int(self._rising[k])
         since = k
         while since > max(k - EDGES + 1, 0) and self._rising[since - 1] == rising:
             since -= 1
         earlier = self._edges[since:k][::-1].tolist()
-        return int(self._after[k]) + off, float(self._edges[k]), rising, tuple(earlier)
+        return self._counted(int(self._after[k]) + off), float(self._edges[k]), rising, tuple(earlier)
 
     def samples(self, t: Array) -> Array:
         """Counts at rig times ``t`` (n,) s, times of their last edges and 1 where these rose, (n, 3), see ``sample``.
@@ -102,6 +105,11 @@ class RoughDisc:
             if random.random() < section.outliers:
                 off += self._in_counts(section.outlier_deg * float(random.standard_normal()))
         return off
+
+    def _counted(self, count: int) -> int:
+        """What the counter shows of a count."""
+        bit = self._section.stuck_bit
+        return count if bit < 0 else count | 1 << bit
 
     def _in_counts(self, degrees: float) -> int:
         return round(math.radians(degrees) / self._quantum)

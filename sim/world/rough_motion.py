@@ -19,7 +19,6 @@ from sim.world.torsion import smooth_step
 Array = npt.NDArray[np.float64]
 MARGIN = 1.0  # s of the grid before the start and after the end
 BACK_AFTER, BACK_WITHIN = 2.0, 3.0  # s, after a stop and of the turn back
-RUN_ON = 0.3  # s, in which a string that stops runs on into its play
 WIND = 2.0  # s, in which a string that is driven winds up
 
 
@@ -96,7 +95,7 @@ class RoughMotion:
             last = self._drills[k + 1].end if k + 1 < len(self._drills) else math.inf
             after = (self.t > drill.end) & (self.t <= last)
             stopped = np.interp(drill.end, self.t, self.head)
-            held = stopped + play * parts[k] * smooth_step(self.t[after] - drill.end, RUN_ON)[0]
+            held = stopped + play * parts[k] * smooth_step(self.t[after] - drill.end, section.run_on_s)[0]
             string[after] = np.minimum(np.maximum(self.head[after], held), self.head[after] + play)
         return string
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from sim.world.borehole import Borehole
 from sim.world.disturbance.row import OneImu, TubeMotion
-from sim.world.disturbance.sensor_reading import move_tube
+from sim.world.disturbance.sensor_reading import move_tube, show_disc
 from sim.world.motion import Motion
 from sim.world.moved_hole import MovedHole
 from sim.world.rough_disc import RoughDisc
@@ -21,6 +21,7 @@ from sim.world.scenario_file import ScenarioFile
 from sim.world.truth import Twist
 
 Array = npt.NDArray[np.float64]
+HEAD = 0  # in the place of a tube
 
 
 class RoughRun:
@@ -45,7 +46,17 @@ class RoughRun:
         """The encoder."""
         section, moved = self._section.encoder, self.moved
         zero = self._file.told.north
-        return RoughDisc(section, moved.t, moved.head, self._begin, self._line_errors, self._seed, zero=zero)
+        head = OneImu(self._file, self._seed, HEAD)
+        return RoughDisc(
+            section,
+            moved.t,
+            moved.head,
+            self._begin,
+            self._line_errors,
+            self._seed,
+            zero=zero,
+            disturbed=lambda shown: show_disc(TubeMotion(moved.t, shown, moved.driven), head),
+        )
 
     def truth(
         self,

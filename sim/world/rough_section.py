@@ -29,6 +29,7 @@ class RoughStringSection(ScenarioSection):
     """How the string follows the head, untold by any torque."""
 
     backlash_deg: NotNegative = Field(0.0, le=10.0, description="play; a string that stops runs on into it")
+    run_on_s: Positive = Field(0.3, description="in which it does")
     twist_deg: NotNegative = Field(0.0, le=90.0, description="by which the string lags the head while it is driven")
     hold_s: NotNegative = Field(2.0, description="after the stop, until the twist unwinds")
     unwind_s: NotNegative = Field(3.0, description="that this takes; 0: it stays until the string is driven again")
@@ -49,6 +50,7 @@ class RoughEncoderSection(ScenarioSection):
     reversed: bool = Field(False, description="wired the wrong way round: it counts backwards")
     outliers: Probability = Field(0.0, description="share of the readings that are off")
     outlier_deg: NotNegative = Field(1.0, description="1 sigma of these")
+    stuck_bit: int = Field(-1, ge=-1, le=11, description="of the counter, that is always set; -1: none")
 
 
 class RoughVibrationSection(ScenarioSection):
@@ -66,8 +68,13 @@ class RoughSensorSection(ScenarioSection):
 
     frames_hz: NotNegative = Field(0.0, le=1000.0, description="of the FIFO; 0: the exact mean of every cycle")
     low_pass_hz: NotNegative = Field(0.0, description="of two poles, before the frames; 0: none")
+    delay_off_ms: float = Field(0.0, ge=-10.0, le=10.0, description="by which the filter delays more than a node knows")
     crystal: float = Field(0.0, ge=-0.2, le=0.2, description="by which its frames come too fast, of 1")
     jitter_ms: NotNegative = Field(0.0, le=100.0, description="of the time stamp of every cycle")
+    stamp_step_ms: float = Field(
+        0.0, ge=-100.0, le=100.0, description="by which all time stamps are off from a time on"
+    )
+    stamp_step_s: NotNegative = Field(0.0, description="after the start, that time")
     force_range_g: Positive = 8.0
     g_sensitivity_dps_per_g: NotNegative = Field(0.0, description="of the gyroscope, each axis to each force; 1 sigma")
     scale_asymmetry: float = Field(
@@ -80,8 +87,9 @@ class RoughSensorSection(ScenarioSection):
 
     @property
     def delay(self) -> float:
-        """Delay (s) of slow changes by the filter: of a Butterworth's two poles 1 / (sqrt(2) pi f)."""
-        return 0.0 if self.low_pass_hz == 0.0 else 1.0 / (math.sqrt(2.0) * math.pi * self.low_pass_hz)
+        """Delay (s) of slow changes by the filter, as a node knows it: of two poles 1 / (sqrt(2) pi f)."""
+        plain = 0.0 if self.low_pass_hz == 0.0 else 1.0 / (math.sqrt(2.0) * math.pi * self.low_pass_hz)
+        return plain - 1e-3 * self.delay_off_ms
 
 
 class RoughSection(ScenarioSection):

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from telemetry.errors import RecordError
-from telemetry.records.column_names import FIELD, FORCE, RATE, TEMPERATURE, TIME, TRIAD, UNITS, G, column_of
+from telemetry.records.known_columns import FIELD, FORCE, RATE, TEMPERATURE, TIME, TRIAD, UNITS, G, column_of
 from telemetry.records.logged_cells import LoggedCells, read_logged_cells
 from telemetry.records.reading_faults import rows_at_range, rows_read_twice
 from telemetry.records.record_columns import Placed, ignored_columns, place_columns

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from telemetry.errors import RecordError
-from telemetry.records.column_names import (
+from telemetry.records.known_columns import (
     COUNTS,
     FIELD,
     FORCE,

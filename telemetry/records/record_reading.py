@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from telemetry.errors import RecordError
-from telemetry.records.column_names import FIELD, FORCE, RATE, UNITS, unit_of
+from telemetry.records.known_columns import FIELD, FORCE, RATE, UNITS, unit_of
 
 KEYS: Final = {"columns", "gyro", "accel", "mag", "rate", "from", "to", "without"}
 SENSOR_KEYS: Final = {RATE: "gyro", FORCE: "accel", FIELD: "mag"}

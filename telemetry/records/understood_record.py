@@ -6,8 +6,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from telemetry.records.column_names import TIME
 from telemetry.records.imu_record import ImuRecord
+from telemetry.records.known_columns import TIME
 
 SHOWN: Final = 3  # of a list
 NO_FAULT: Final = "no gap, no fault"

@@ -71,7 +71,7 @@ def test_what_stays_of_a_dates_error_is_the_best_of_late(told_ms: list[float], l
 @pytest.mark.timeout(600)
 def test_an_mpu6500_with_delay_crystal_and_fifo_is_as_good_as_it_says_and_never_called_faulty() -> None:
     case = next(case for case in CASES if case.key == "mpu6500")
-    figures = disturbance_row(case, [run_seed((case.setup, seed)) for seed in range(1, 101)])
+    figures = disturbance_row(case, [run_seed((case, seed)) for seed in range(1, 101)])
     assert 0.8 < figures["nees_turning"] < 1.25
     assert 0.8 < figures["nees_rest"] < 1.25
     assert figures["gyro_step"] == figures["gyro_scale"] == figures["other_faults"] == 0

@@ -140,7 +140,18 @@ CASES: dict[Code, Callable[[], Bench]] = {
     Code.BIAS_MOVED: lambda: known().cycles(20, FAST).cycles(20, spoil=warmed),
     Code.AIDING_DOUBTED: lambda: wobbling(known()),
     Code.ENCODER_REVERSED: lambda: known().cycles(4, FAST, aided=False).aid(rate=-FAST).cycles(1, aided=False),
+    Code.AXES_EXCHANGED: lambda: known().cycles(40, FAST, spoil=exchanged),
+    Code.ENCODER_STANDS: lambda: standing(standing(known().cycles(4, FAST))).cycles(1, aided=False),
 }
+
+
+def exchanged(w: Numbers, f: Numbers) -> tuple[Numbers, Numbers]:
+    return (w[1], w[0], w[2]), (f[1], f[0], f[2])
+
+
+def standing(bench: Bench) -> Bench:
+    """A head that turns on while its encoder tells of a rest."""
+    return bench.cycles(1, FAST, aided=False).aid(rate=0.0)
 
 
 def warmed(w: Numbers, f: Numbers) -> tuple[Numbers, Numbers]:

@@ -138,6 +138,21 @@ def test_a_step_that_goes_away_is_flagged_again_and_recovered_from(healthy: Stri
     assert abs(string.error[-1]) < 3.0 * string.std[-1]
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_step_that_goes_away_while_nothing_aids_leaves_no_yaw_surer_than_it_is(seed: int) -> None:
+    """A string that winds up looks like a step of the gyroscope, and what is learnt of it is false from then on."""
+    plain = StringOfOne(seed)
+    begin, end = plain.turning(1, 0.4), plain.resting(1, 0.0)
+    string = StringOfOne(seed, step(begin, 0.25, end), loss=0.0).advance(end)
+    assert "gyro_step" in string.codes(begin)
+    string.string.schedule.is_sent[end : end + 40] = False
+    string.advance(40)
+    off, std = np.abs(string.error[end : end + 40]), string.std[end : end + 40]
+    assert off[-1] > 2.0 * DEG, "0.25 deg/s for 21 s"
+    assert np.max(off[3:] / std[3:]) < 4.0
+    assert off[-1] < 2.0 * std[-1], "it grows while nothing measures"
+
+
 @pytest.mark.parametrize("factor", [1.03, 1.005])
 def test_a_new_scale_is_named_and_learnt(factor: float, healthy: StringOfOne) -> None:
     at = healthy.resting(0)

@@ -17,7 +17,7 @@ from node.errors import SensorError
 from node.process.drivers.choice import imu_source
 from node.process.drivers.recorded_imu import RecordedMeans, load_record
 from node.process.drivers.source import SafeImu
-from node.process.drivers.vn100 import Vn100, checksum
+from node.process.drivers.vn100 import Vn100, line_checksum
 from telemetry.messages import Severity
 from telemetry.records.record_reading import RecordReading
 
@@ -86,7 +86,7 @@ def test_it_turns_by_what_a_record_of_its_samples_does(line: Line, tmp_path: Pat
 
 
 def test_the_checksum_is_the_manual_s() -> None:
-    assert checksum(b"VNRRG,8") == 0x4B
+    assert line_checksum(b"VNRRG,8") == 0x4B
 
 
 def test_a_damaged_line_is_dropped_and_a_cut_one_waits_for_its_end(line: Line) -> None:

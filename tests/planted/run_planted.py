@@ -125,6 +125,7 @@ def become_tests(root: Path, tests: Sequence[str], chosen: str, told: Path) -> N
         for name in ("defect_lists", "choice_of_tests", "kernel_switch"):
             del sys.modules[name]  # the copy has its own
         command = ["-x", "-q", "--no-header", "--tb=no", "-p", "no:cacheprovider", "-p", "no:xdist"]
+        command.append("--timeout=0")  # the limit is that of the whole run, on a machine that may be busy
         command += ["-W", "ignore::pytest.PytestAssertRewriteWarning", "-m", chosen]
         code = int(importlib.import_module("pytest").main([*command, *(f"tests/{test}" for test in tests)]))
         sys.stdout.flush()

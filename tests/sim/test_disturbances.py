@@ -2,6 +2,7 @@
 
 import ast
 import functools
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args, get_origin
@@ -10,11 +11,13 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, READING, SPLIT, TEMPERATURE
+from node.kernels.record.node_record import A_YAW, BEHIND, LATE, LATE_STD, READING, SPLIT, TEMPERATURE
 from sim.campaign.chunk import Campaign
 from sim.errors import ScenarioError
 from sim.string.allowlist import UNUSED, is_expressed, refused_keys
+from sim.string.direct_string import DirectString
 from sim.string.drawn_string import DrawnString
+from sim.string.head_measurements import measure_head
 from sim.studies.scenarios import Tables, change_sections
 from sim.world.disturbance.chain import lane_starts
 from sim.world.disturbance.disturbance_table import TABLE
@@ -114,8 +117,17 @@ REFUSED: dict[str, Tables] = {
     "jitter": sensor(jitter_ms=10.0),
     "single-samples": gyroscope(instantaneous=True),
     "bias-step": gyroscope(bias_step_dps=1.0),
+    "slow-twist": change_sections(ROUGH, disturbance={"slow-twist": {"twist_deg": 2.0}}),
+    "joint-slips": change_sections(ROUGH, disturbance={"joint-slips": {"slip_deg": 2.0}}),
+    "whirl": change_sections(ROUGH, disturbance={"whirl": {"lean_deg": 1.0, "force_g": 0.1}}),
     "drift": change_sections(PLAIN, drift={"accelerometer_bias_std_mps2": 0.1}),
     "eighths": gyroscope(increments=True),
+}
+# rows that change no reading of an IMU, but what the encoder counts, or which cycles are run
+OFF_THE_IMU: dict[str, Tables] = {
+    "counter-stands": change_sections(ROUGH, disturbance={"counter-stands": {"after_s": 70.0, "stands_s": 3.0}}),
+    "counts-lost": change_sections(ROUGH, disturbance={"counts-lost": {"above_dps": 50.0, "share": 0.01}}),
+    "lost-cycles": disturbed("lost-cycles", after_s=70.0, cycles=3),
 }
 
 
@@ -160,19 +172,38 @@ def quiet_rows(*, is_rough: bool) -> np.ndarray:
 
 
 def test_every_row_of_the_table_is_tried_once() -> None:
-    assert sorted(row.name for row in TABLE) == sorted([*EXACT, *DRAWN_ANEW, *REFUSED])
+    assert sorted(row.name for row in TABLE) == sorted([*EXACT, *DRAWN_ANEW, *REFUSED, *OFF_THE_IMU])
 
 
-@pytest.mark.parametrize("name", [row.name for row in TABLE])
+@pytest.mark.parametrize("name", [row.name for row in TABLE if row.name not in OFF_THE_IMU])
 def test_a_row_that_is_on_changes_what_a_rig_reads(name: str) -> None:
     tables = EXACT.get(name) or REFUSED.get(name) or DRAWN_ANEW[name][0]
     before, after = quiet_rows(is_rough="rough" in tables), rig_rows(scenario_of(dict(tables)), SEED)
     assert np.abs(after - before).max() > 5e-5  # the earth's rate is 7.3e-5 rad/s
 
 
-@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize("name", ["counter-stands", "counts-lost"])
+def test_a_row_of_the_disc_changes_what_the_encoder_measures(name: str) -> None:
+    """The counter that stands misses 3 s of 71 deg/s; the slow one a hundredth of what it turns above 50 deg/s."""
+    clean, off = (measure_head(World(scenario_of(dict(tables)), SEED)) for tables in (ROUGH, OFF_THE_IMU[name]))
+    missed = np.degrees(np.mod(clean[-1, A_YAW] - off[-1, A_YAW], math.tau))
+    turned, slow = 10.0 * 360.0, 2.0 * 50.0**2 / 35.0 / 2.0  # deg; on the two ramps, below 50 deg/s
+    expected = 3.0 * 71.0 if name == "counter-stands" else 0.01 * (turned - slow)
+    assert missed == pytest.approx(expected % 360.0, abs=0.5)
+
+
+def test_cycles_that_are_lost_are_run_by_no_node() -> None:
+    world = World(scenario_of(dict(OFF_THE_IMU["lost-cycles"])), SEED)
+    string = DirectString(world)
+    run = string.drill()
+    missing = np.flatnonzero(np.isnan(run.yaw[:, 0]))
+    assert missing.tolist() == [k for k in range(world.cycles) if world.ends[k] - world.begin >= 70.0][:3]
+    assert string.nodes[0]["cycles"] == world.cycles - 3
+
+
+@pytest.mark.parametrize("name", [*REFUSED, "counter-stands", "counts-lost"])
 def test_a_row_without_a_form_for_campaigns_is_refused_by_its_key(name: str) -> None:
-    scenario = scenario_of(dict(REFUSED[name]))
+    scenario = scenario_of(dict({**REFUSED, **OFF_THE_IMU}[name]))
     row = next(row for row in TABLE if row.name == name)
     with pytest.raises(
         ScenarioError, match=r"a campaign cannot express it; borechain rig runs such a scenario"
@@ -300,6 +331,7 @@ BESIDE: dict[str, dict[str, Any]] = {
 }
 # other values than the usual ones, where the rule of ``other_value`` has none that can be or that would be noticed
 OTHER: dict[str, Any] = {
+    "rough.encoder.stuck_bit": 3,
     "rig.tubes": 3,
     "rig.tube_length_m": 2.5,
     "rig.tubes_at_start": 0,

@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from telemetry.errors import InputError, RecordError
-from telemetry.records.column_names import column_of
 from telemetry.records.imu_record import ImuRecord, read_imu_record
+from telemetry.records.known_columns import column_of
 from telemetry.records.record_reading import read_told
 from telemetry.records.record_stamps import times_of_stamps
 from telemetry.records.understood_record import understood_line, understood_object

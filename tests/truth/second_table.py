@@ -84,10 +84,10 @@ class Seen:
     surveys: int
 
 
-def drill(name: str, seed: int) -> Seen:
+def drill(name: str, seed: int, given: SecondWorld | None = None) -> Seen:
     """Take the nodes of one row through the world of one seed."""
-    what = ROWS[name]
-    world = SecondWorld(what, seed)
+    world = given or SecondWorld(ROWS[name], seed)
+    what = world.what
     random, phase = world.random, 0.0 if what.locked else float(world.random.uniform(0.0, PERIOD))
     joint, second, misread = *random.uniform(-3.0, 3.0, 2).tolist(), math.radians(what.wrong_mark_deg)
     grows = name.startswith("mark")
@@ -116,7 +116,7 @@ def drill(name: str, seed: int) -> Seen:
         if phase > LATENCY:
             relay(k)
         for tube, sensor in zip(tubes, sensors, strict=True):
-            if tube.settings.tube == 2 and end < OPENED:
+            if k in world.lost or (tube.settings.tube == 2 and end < OPENED):
                 continue
             joined = not (grows and OPENED < end < CLOSED)
             hops = len(tubes) - tube.settings.tube + 1 if end > OPENED else 1

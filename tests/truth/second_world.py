@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from node.firmware.encoder_node import EncoderNode, EncoderSample
-from node.process.drivers.fifo_window import parts_of
+from node.process.drivers.fifo_window import parts_of, window_std
 from node.process.drivers.frame_clock import FrameClock
 from telemetry.messages import Aiding
 
@@ -94,6 +94,8 @@ class SecondWorld:
     ends : (m,) s, of the encoder's cycles
     """
 
+    run_on, lost = 0.3, frozenset[int]()  # s, into the play; cycles that no node runs
+
     def __init__(self, what: Disturbance, seed: int) -> None:
         self.what, self.random = what, np.random.default_rng([20261122, seed])
         length = BLOCKS * (HOLD + DRILL + STOP) + FINISH
@@ -126,16 +128,17 @@ class SecondWorld:
             u = self.t - start
             inside = (u >= 0.0) & (u <= DRILL)
             even = np.clip(np.minimum(RAMP * u, RAMP * (DRILL - u)), 0.0, SPEED)
-            swing = 1.0 + self.what.ripple * np.sin(math.tau * u / 4.0)
-            if self.what.stick_slip:
-                swing = 8.0 / 3.0 * np.sin(math.pi * u / 5.0) ** 4
-            even = even * swing
+            even = even * self._swing(u)
             even[(u > 0.5 * DRILL) & (RAMP * (DRILL - u) < math.radians(self.what.dead_stop_dps))] = 0.0
             back = u - DRILL - 2.0
             bump = np.where((back > 0.0) & (back < 3.0), np.sin(math.pi * back / 3.0) ** 2 / 1.5, 0.0)
             rate += even - math.radians(self.what.turns_back_deg) * bump
             driven += inside
         return rate, driven
+
+    def _swing(self, u: Array) -> Array:
+        stuck = 8.0 / 3.0 * np.sin(math.pi * u / 5.0) ** 4
+        return np.asarray(stuck if self.what.stick_slip else 1.0 + self.what.ripple * np.sin(math.tau * u / 4.0))
 
     def _followed(self, head: Array) -> Array:
         """Through the play: driven at one flank, it runs on at a stop, and waits there for the head."""
@@ -145,7 +148,7 @@ class SecondWorld:
         coast = np.zeros_like(head)
         for start in self.starts:
             u = self.t - start - DRILL
-            coast[(u > 0.0) & (u < 0.3)] = play * self.random.random() / (0.3 * HERTZ)
+            coast[(u > 0.0) & (u < self.run_on)] = play * self.random.random() / (self.run_on * HERTZ)
         followed = head.copy()
         for k in range(1, len(head)):
             followed[k] = min(max(followed[k - 1] + coast[k], head[k]), head[k] + play)
@@ -273,7 +276,7 @@ class SecondWorld:
         for k, end in enumerate(ends):
             clock.on_read(float(end), int(borders[k + 1] - borders[k]))
             found, shown = frames[borders[k] : borders[k + 1]], clock.end - delay
-            mean[k], late[k] = found.mean(axis=0), (end - shown, clock.std)
+            mean[k], late[k] = found.mean(axis=0), (end - shown, window_std(clock.std, delay))
             if k and (told := parts_of(found[:, 2], (shown - len(found) * clock.period, shown), end - PERIOD, end)):
                 parts[k] = told
         return mean, late[:, 0], late[:, 1], parts

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from second_table import ROWS, Seen, drill
 from second_world import BLOCKS, LINES, RAMP, SPEED, TURNED, Disturbance, SecondWorld, smallest
+from third_table import THIRD_ROWS, drill_third
 
 from sim.studies.field.cases import CASES
 from sim.studies.field.run import run_seed
+from sim.studies.field.third_world import THIRD
 
 HERE = Path(__file__).parent
 CLEAN = "clean, random phase"
@@ -34,11 +36,14 @@ def test_it_shares_no_module_with_the_simulator_and_is_short() -> None:
     for file in files:
         names = imported(file)
         assert not {name for name in names if name.split(".")[0] in ("sim", "groundstation", "borechain")}
+    names = imported(HERE / "third_table.py")
+    assert not {name for name in names if name.split(".")[0] in ("sim", "groundstation", "borechain")}
     assert sum(len(file.read_text().splitlines()) for file in files) <= 500
 
 
 def test_it_has_every_row_of_the_study() -> None:
     assert list(ROWS) == [case.name for case in CASES]
+    assert list(THIRD_ROWS) == [case.name for case in THIRD]
 
 
 @cache
@@ -152,10 +157,10 @@ def kinds_of(name: str, when: str, rms: np.ndarray) -> list[np.ndarray]:
 @pytest.mark.parametrize("name", ROWS)
 def test_both_worlds_show_the_same(name: str) -> None:
     seeds = 16
-    (setup,) = (case.setup for case in CASES if case.name == name)
+    (case,) = (case for case in CASES if case.name == name)
     with ProcessPoolExecutor() as pool:
         here = list(pool.map(drill, repeat(name), range(1, seeds + 1)))
-        there = list(pool.map(run_seed, [(setup, seed) for seed in range(1, seeds + 1)]))
+        there = list(pool.map(run_seed, [(case, seed) for seed in range(1, seeds + 1)]))
     told = np.array([[s.told[s.turning | s.resting].mean() for s in here], [s.told.mean() for s in there]])
     for when in ("turning", "resting"):
         ours, theirs = (np.sqrt([np.mean(s.error[getattr(s, when)] ** 2) for s in runs]) for runs in (here, there))
@@ -164,3 +169,13 @@ def test_both_worlds_show_the_same(name: str) -> None:
             assert 1 / 3 < np.median(of_ours) / np.median(of_theirs) < 3, when
     assert abs(told[0].mean() - told[1].mean()) < 0.35
     assert np.mean([s.surveys for s in here]) == np.mean([s.surveys for s in there]) == BLOCKS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["encoder stands for 3 s", "axes x and y exchanged", "a cycle lost on a ramp"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_a_third_world_found_is_told_or_counted_here_too(name: str, seed: int) -> None:
+    run = drill_third(name, seed)
+    judged = (run.turning | run.resting) & ~run.told
+    assert not run.faults
+    assert np.mean(run.error[judged] ** 2 > 9.0 * run.var[judged]) <= 0.01

@@ -21,8 +21,8 @@ from groundstation.report.calibration_sheets import allan_sheet
 from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome, naming_file
 from groundstation.report.calibrations.calibration_request import AllanRequest, RecordWords
 from telemetry.errors import RecordError
-from telemetry.records.column_names import FIELD, FORCE, RATE, UNITS, known_unit
 from telemetry.records.imu_record import ImuRecord, has_bare_triad, read_imu_record
+from telemetry.records.known_columns import FIELD, FORCE, RATE, UNITS, known_unit
 from telemetry.records.understood_record import understood_line, understood_object
 
 

@@ -33,7 +33,7 @@ LARGEST = 1e300
 ZERO: Triple = ("0", "0", "0")
 Window = tuple[float, float]
 EVERYWHERE: Window = (-math.inf, math.inf)
-COMPANION = "-COMPANION"  # ends the name of a companion in a vertical hole: ``across_vertical``
+COMPANION = "-ACROSS"  # ends the name of a companion in a vertical hole: ``across_vertical``
 PREVIOUS = "previous"  # the azimuth weight of the station before, of drift and random walk
 
 

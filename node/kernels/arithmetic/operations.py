@@ -188,6 +188,12 @@ def stamp_before(stamp: float, later: float) -> float:
     return stamp - later
 
 
+@by_type(lambda stamp: rounded_shift(stamp, RATE_Q - TIME_Q))
+def stamp_time(stamp: float) -> float:
+    """The error of a time stamp as a time."""
+    return stamp
+
+
 @by_type(lambda drift, time: rounded_shift(rounded_shift(drift, 16) * min(time, LONGEST), RATE_Q - 16))
 def clock_drift_offset(drift: float, time: float) -> float:
     """By how much (s) a clock is off by its ``drift`` (s/s) after a ``time``, in integers of up to 4096 s."""
@@ -301,3 +307,9 @@ def are_numbers(rate: Array, force: Array) -> bool:
 def angle_of(like: float, binary: int) -> float:
     """Angle (rad) in [0, 2 pi) of a binary angle, in the form of ``like``."""
     return float(binary) * (2.0 * math.pi / 4294967296.0)
+
+
+@by_type(lambda angle, binary: (int(binary) + radians_to_counts(angle, ANGLE_Q)) & TURN)
+def turned_binary(angle: float, binary: int) -> int:
+    """A binary angle turned by an angle (rad)."""
+    return (int(binary) + math.floor(angle / (2.0 * math.pi) * 4294967296.0 + 0.5)) & 0xFFFFFFFF

@@ -112,6 +112,7 @@ PAIRS: Final = (
         "state cycle:count begin:time end:time",
         gives="rate",
     ),
+    TwoForms("missed_var", "float64.fixed_lag", "fixed.fixed_lag", "state cycle:count gap:time", gives="var"),
     TwoForms(
         "interpolation_var",
         "float64.fixed_lag",

@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
+from node.kernels.arithmetic.formats import RATE_Q, UNIT
+from node.kernels.arithmetic.integers import multiply_q31, rounded_shift
 from node.kernels.arithmetic.jit import kernel, kernel_constant
-from node.kernels.arithmetic.operations import bounded_variance, stamp_before
+from node.kernels.arithmetic.operations import bounded_variance, by_record, stamp_before
 from node.kernels.arithmetic.quantity import LONG_AGO, NOT_YET, ONE, variance_quantity
 from node.kernels.filter.covariance import isolate_state, set_apart
 from node.kernels.filter.modes import STATIC_BIAS
@@ -24,6 +26,7 @@ BX, BZ, S, D = (
     kernel_constant(Err.SCALE),
     kernel_constant(Err.STAMP),
 )
+RATE_RIGHT: Final = RATE_Q - 31 + UNIT  # from rad/s to rad a unit of time in Q31
 UNKNOWN_TILT_VAR: Final = variance_quantity(1.0)  # rad^2
 UNKNOWN_VAR: Final = variance_quantity(UNKNOWN_YAW_VAR)  # rad^2
 UNIFORM_VAR: Final = variance_quantity((math.pi / math.sqrt(3.0)) ** 2)  # rad^2, of the whole turn
@@ -35,6 +38,25 @@ def copy_covariance(state: Any) -> None:
     for i in range(STATES):
         for j in range(STATES):
             state.now_P[i, j] = state.P[i, j]
+
+
+def _turn_present(node: Any, rate: int) -> None:
+    state = node.filter
+    a_unit = rounded_shift(rate, RATE_RIGHT)
+    with_stamp = multiply_q31(state.now_P[PSI, D], a_unit)
+    own = multiply_q31(multiply_q31(state.now_P[D, D], a_unit), a_unit)
+    state.now_P[PSI, PSI] = max(state.now_P[PSI, PSI] + 2 * with_stamp + own, 0)
+
+
+@by_record(_turn_present)
+def turn_present(node: Any, rate: float) -> None:
+    """The yaw of the present was turned on by the time stamp's estimate times a ``rate`` (rad/s): its variance.
+
+    An aiding shows yaw and time stamp together, so the error of the one is mostly taken back by that of the other.
+    """
+    state = node.filter
+    with_stamp, own = rate * state.now_P[PSI, D], rate * rate * state.now_P[D, D]
+    state.now_P[PSI, PSI] = max(state.now_P[PSI, PSI] + 2.0 * with_stamp + own, 0.0)
 
 
 @kernel

@@ -68,6 +68,8 @@ class Code(enum.IntEnum):
     BIAS_MOVED = 35
     AIDING_DOUBTED = 36
     ENCODER_REVERSED = 37
+    ENCODER_STANDS = 38
+    AXES_EXCHANGED = 39
 
 
 @by_type(lambda like, count: count << TOLD_Q)

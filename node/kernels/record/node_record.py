@@ -16,8 +16,8 @@ from node.kernels.record.sensor_record import MAX_IMUS, MOUNT, OFFSET, STATIC, S
 
 # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches,
 # 6 no odd forces, 7 no swings, 8 no ramps, 9 no revisions, 10 no parts of cycles,
-# 11 no wrong aidings
-NODE_LAYOUT: Final = 12
+# 11 no wrong aidings, 12 no counters that stand and no mirror
+NODE_LAYOUT: Final = 13
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
@@ -93,6 +93,17 @@ RAMP: Final = np.dtype(
     ],
     align=True,
 )
+MIRROR: Final = np.dtype(
+    [
+        ("exchanged", "i8"),  # 1: x and y of the sensors are, and are exchanged back
+        ("cycles", "i8"),  # of turning, over which the means are
+        ("down", "f8", (2,)),  # direction of gravity across the axis, at the end of the cycle before
+        ("across", "f8"),  # mean of Im(z p), of the force z and the direction p across the axis
+        ("felt", "f8"),  # mean of |z|^2
+        ("turned", "f8"),  # mean of |p|^2
+    ],
+    align=True,
+)
 GUARD: Final = np.dtype(
     [
         ("readings", READINGS),  # the newest readings, to see repeats
@@ -103,14 +114,17 @@ GUARD: Final = np.dtype(
         ("rate", "f8"),  # rad/s, that the encoder told last
         ("rate_at", "f8"),  # s, own clock, of that aiding
         ("aiding_var", "f8"),  # rad^2, of that aiding
+        ("agreed_rate", "f8"),  # rad/s, of the node when an aiding agreed with it last
         ("sane_rate", "f8"),  # rad/s about the axis, the gyroscope's last sane one
         ("found", MISMATCH),  # work space
         ("step", MISMATCH),  # mismatch that the constant bias has taken
         ("before_steps", "f8"),  # rad/s, the constant bias before the first step; NaN: it took none
+        ("unproven", "f8"),  # rad/s, of a step that no rest has confirmed
         ("first_step", "f8"),  # rad/s, size of that step
         ("jumped", "i8"),  # 1: the clock jumped in the cycle before
         ("untimely", "i8"),  # 1: the aiding before was untimely
         ("reversed", "i8"),  # 1: the encoder counts against the gyroscope
+        ("stands", "i8"),  # aidings in a row of a head at rest, while the gyroscope goes on turning
         ("rest_cycles", "i8"),  # cycles in a row in which the encoder reports a head at rest
         ("doubted", "i8"),  # 1: innovations are larger than their variance explains
         ("misfit", "f8"),  # mean of their squares over their variances
@@ -120,6 +134,7 @@ GUARD: Final = np.dtype(
         ("shared", "f8"),  # rad^2, mean of the products of neighbours
         ("swing", SWING),  # of the drive, between cycles
         ("ramp", RAMP),  # of the drive, over cycles
+        ("mirror", MIRROR),  # of the sensors' axes
         ("jump", "f8"),  # rad, by which resets that nothing explains have moved the yaw
         ("last_jump", "f8"),  # rad, of it by the reset since the last aiding that agreed
         ("odd", "i8"),  # cycles in a row whose force at rest is not that of gravity as the filter has it
@@ -354,7 +369,7 @@ def forget_session(nodes: Array) -> None:
     guard["aidings"]["at"] = np.nan
     guard["aidings"]["left"] = 0.0
     guard["aidings"]["seen"] = guard["aidings"]["wrong"] = 0
-    guard["rate"] = guard["sane_rate"] = guard["aiding_var"] = 0.0
+    guard["rate"] = guard["sane_rate"] = guard["agreed_rate"] = guard["aiding_var"] = 0.0
     guard["rate_at"] = -np.inf
     guard["swing"] = np.zeros(1, SWING)
     guard["jumped"] = guard["untimely"] = guard["agreed"] = guard["rest_cycles"] = 0

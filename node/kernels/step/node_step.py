@@ -70,12 +70,14 @@ from node.kernels.sensors.static_average import follow_recording
 from node.kernels.string.make_up import follow_joints
 from node.kernels.string.relay import offer_aiding
 from node.kernels.string.twist import gate_twist, holds_survey, reaching_var, twist_var
+from node.kernels.turns.exchanged_axes import put_axes_right, watch_axes
 from node.kernels.turns.gates import admits_cycle, gate_aiding
 from node.kernels.turns.guard import guard_reading, judge_cycle
+from node.kernels.turns.mismatches import doubt_step
 from node.kernels.turns.ramps import follow_ramp
 from node.kernels.turns.rest_watch import watch_rest
 from node.kernels.turns.swings import follow_swing
-from node.kernels.turns.yaw_doubts import noise_var, passing_var, unexplained_var
+from node.kernels.turns.yaw_doubts import noise_var, passing_var, put_delay_right, unexplained_var
 
 STILL_CYCLES: Final = 4  # after which a node takes itself for standing
 LARGEST_OFFSET: Final = rate_quantity(
@@ -159,7 +161,7 @@ def begin_step(nodes: Array, settings: Array, parameters: Array, readings: Array
 def end_step(nodes: Array, settings: Array, moment: Array, status: int, waits: int) -> int:
     """What comes after a loop that returned ``status``; ``waits`` is the answer of ``begin_step``."""
     node = nodes[0]
-    after_loop(node, moment, status, waits)
+    after_loop(node, settings[0], moment, status, waits)
     return conclude_cycle(nodes, settings, moment)
 
 
@@ -178,6 +180,7 @@ def before_loop(node: Any, settings: Any, moment: Array, saturated: int) -> int:
     """Judge the readings, follow the clock, level coarsely, count; 1 if the survey of this stop has to wait."""
     state = node.filter
     start, end = moment[START], moment[END]
+    put_axes_right(node)
     turn_down(node)
     guard_reading(node, settings, saturated, end)
     put_right(node, settings.imus)
@@ -194,11 +197,14 @@ def before_loop(node: Any, settings: Any, moment: Array, saturated: int) -> int:
 
 
 @kernel
-def after_loop(node: Any, moment: Array, status: int, waits: int) -> None:
+def after_loop(node: Any, settings: Any, moment: Array, status: int, waits: int) -> None:
     """Take what the loop made of the cycle, and judge it."""
     take_status(node, status, waits)
     follow_swing(node)
     follow_ramp(node)
+    watch_axes(node, settings)
+    put_delay_right(node)
+    doubt_step(node, moment[END] - moment[START])
     judge_cycle(node, node.status, moment[END])
 
 

@@ -21,7 +21,7 @@ from node.kernels.arithmetic.operations import (
     time_root,
     turned_angle,
 )
-from node.kernels.arithmetic.quantity import NONE, rate_quantity, time_quantity, variance_quantity
+from node.kernels.arithmetic.quantity import LONG_AGO, NONE, rate_quantity, time_quantity, variance_quantity
 from node.kernels.filter.modes import STATIC_BIAS
 from node.kernels.filter.priors import is_beyond_gate
 from node.kernels.filter.resets import begin_epoch, doubt_stamp, doubt_yaw, open_yaw
@@ -29,6 +29,7 @@ from node.kernels.record.events import Code, event_count, event_degrees, event_n
 from node.kernels.record.filter_record import CLOCK_SLACK, Err
 from node.kernels.record.node_record import A_CLOCK_VAR, A_RATE, A_VALID, A_YAW, A_YAW_VAR
 from node.kernels.turns.aiding_watch import reset_aiding_watch
+from node.kernels.turns.guard import stood_in_this_rest
 from node.kernels.turns.sensor_trust import is_faulty
 from node.kernels.turns.yaw_doubts import is_dated, misfit_var
 
@@ -40,10 +41,14 @@ BACKWARD: Final = time_quantity(
 )  # s, that a cycle may begin before the end of the last; more is a jump of the clock
 LONGEST_CYCLE: Final = time_quantity(10.0 * PERIOD)  # s
 FARTHEST: Final = LONGEST_CYCLE  # s, that a cycle may begin after the end of the last; no rate stands for more
+SLOWEST_STOOD: Final = rate_quantity(
+    6.0 * DEG
+)  # rad/s, that no offset of a gyroscope reaches; the slow alignment turn is faster
+STOOD: Final = 2  # aidings in a row, from where the counter of a head that turns is seen to stand
 FAR_OFF: Final = 4  # sigmas, that a clock may be wrong by
 SLACK_VAR: Final = variance_quantity(CLOCK_SLACK * CLOCK_SLACK)  # s^2, of a clock that can place an aiding in a turn
 PSI = kernel_constant(Err.YAW)
-ENCODER_REVERSED = kernel_constant(Code.ENCODER_REVERSED)
+ENCODER_REVERSED, ENCODER_STANDS = kernel_constant(Code.ENCODER_REVERSED), kernel_constant(Code.ENCODER_STANDS)
 AIDING_UNTIMELY, CLOCK_JUMPED = kernel_constant(Code.AIDING_UNTIMELY), kernel_constant(Code.CLOCK_JUMPED)
 
 
@@ -66,7 +71,7 @@ def gate_aiding(node: Any, aiding: Array) -> bool:
     elif aiding[A_RATE] != 0 and guard.rate == 0:
         doubt_date(node)
     guard.rate, guard.rate_at, guard.aiding_var = aiding[A_RATE], valid_local, aiding[A_YAW_VAR]
-    if is_reversed(node) or not is_placed(state, aiding):
+    if is_reversed(node) or stands_still(node) or not is_placed(state, aiding):
         return False
     if guard.gyro.fault != 0 or contradicts_gyroscope(node, aiding[A_YAW] + node.down_offset, valid_local):
         state.last_sequence = -1  # a repetition at rest is to be judged again
@@ -111,6 +116,29 @@ def is_reversed(node: Any) -> bool:
         queue_event(node, ENCODER_REVERSED, told, own, NONE, NONE)
     guard.reversed = 1 if against else 0
     return against
+
+
+@kernel
+def stands_still(node: Any) -> bool:
+    """Whether the counter stands while the head turns, which is told once: the gyroscope goes on as it did before.
+
+    Of two that part the one that has changed is in doubt. A gyroscope that stood still in this rest, or repeats itself,
+    has changed itself. One aiding proves nothing: a head that stopped dead was turning in the node's newest cycle.
+    """
+    state, guard = node.filter, node.guard
+    goes_on = guard.rate == 0 and abs(state.now_rate) > SLOWEST_STOOD and state.yaw_known == 1
+    changed = is_faulty(guard.gyro) or guard.readings.rates.counts[2] > 0 or stood_in_this_rest(node)
+    if not goes_on or changed or state.mode == STATIC_BIAS:
+        guard.stands = 0
+        return False
+    guard.stands = min(guard.stands + 1, STOOD + 1)
+    if guard.stands < STOOD:
+        return False
+    if guard.stands == STOOD:
+        queue_event(node, ENCODER_STANDS, event_degrees(state.now_rate, RATE_Q), NONE, NONE, NONE)
+    guard.rate, guard.rate_at = state.now_rate, LONG_AGO  # its word is not taken, neither for a rest nor for a turn
+    reset_aiding_watch(guard.aidings)
+    return True
 
 
 @kernel

@@ -38,6 +38,8 @@ NARROW_STD: Final = angle_quantity(1.0 * DEG)  # of an innovation that can show 
 CREDIBLE: Final = rate_quantity(
     5.0 * DEG
 )  # rad/s, from the encoder's rate, of a gyroscope that may be listened to again
+UNCHANGED: Final = rate_quantity(2.0 * DEG)  # rad/s, by which a rate that goes on may differ from what it was
+CHANGED: Final = rate_quantity(6.0 * DEG)  # rad/s, from where half a rate is another one
 LARGEST_DRIFT: Final = rate_quantity(1.0 * DEG)  # rad/s, of a bias since the last rest; more is a fault, or a motion
 BAD_SAMPLE, GYRO_STEP = kernel_constant(Fault.BAD_SAMPLE), kernel_constant(Fault.GYRO_STEP)
 AIDED, REJECTED, YAW_RESET = int(CycleStatus.AIDED), int(CycleStatus.REJECTED), int(CycleStatus.YAW_RESET)
@@ -91,6 +93,8 @@ def judge_cycle(node: Any, status: int, at: float) -> None:
         return
     sigma = angular_root(max(state.innovation_var, 0) + misfit_var(node))
     patience = patience_of(node)
+    if has_encoder_changed(node, rejected):
+        reset_aiding_watch(guard.aidings)
     find_mismatch(guard.aidings, guard.found, state.innovation, sigma, state.now_rate, at, rejected, reset, patience)
     if guard.gyro.fault == 0:
         follow_doubts(node, rejected, reset)
@@ -100,6 +104,21 @@ def judge_cycle(node: Any, status: int, at: float) -> None:
         guard.agreed = 0 if rejected == 1 else guard.agreed + (1 if sigma < NARROW_STD else 0)
         if guard.agreed >= AGREEING:
             recover_gyro(node)
+
+
+@kernel
+def has_encoder_changed(node: Any, rejected: int) -> bool:
+    """Whether an aiding that contradicts comes of an encoder that turns at less than half of what it agreed with last.
+
+    Each of the two is compared with its own past: a gyroscope that goes on as it did, and does not repeat itself, takes
+    no step while the counter stands or slips.
+    """
+    state, guard = node.filter, node.guard
+    if rejected == 0:
+        guard.agreed_rate = state.now_rate
+        return False
+    goes_on = abs(state.now_rate - guard.agreed_rate) < UNCHANGED and guard.readings.rates.counts[2] == 0
+    return bool(goes_on and abs(guard.agreed_rate) > CHANGED and abs(guard.rate) < half_of(abs(guard.agreed_rate)))
 
 
 @kernel

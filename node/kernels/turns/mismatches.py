@@ -16,13 +16,14 @@ from node.kernels.arithmetic.operations import (
     is_number,
     scale_square,
     times_factor,
+    turned_angle,
 )
-from node.kernels.arithmetic.quantity import NONE, factor_quantity, rate_quantity, rate_variance_quantity
+from node.kernels.arithmetic.quantity import LONG_AGO, NONE, factor_quantity, rate_quantity, rate_variance_quantity
 from node.kernels.filter.priors import bias_var, scale_var
-from node.kernels.filter.resets import settle_yaw, take_mismatch
+from node.kernels.filter.resets import open_yaw, settle_yaw, take_mismatch
 from node.kernels.record.events import Fault, event_degrees, queue_event
 from node.kernels.record.filter_record import Err
-from node.kernels.turns.aiding_watch import STEADY
+from node.kernels.turns.aiding_watch import STEADY, UNWINDING
 from node.kernels.turns.ramps import explain_ramp
 from node.kernels.turns.sensor_trust import tell_recovery
 from node.kernels.turns.yaw_doubts import explain_jump
@@ -61,6 +62,7 @@ def learn_mismatch(node: Any) -> None:
         if not is_number(guard.before_steps):
             guard.before_steps, guard.first_step = state.static_bias[2], abs(found.rate)
         state.static_bias[2] -= found.rate
+        guard.unproven = max(guard.unproven, min(abs(found.rate), UNWINDING))
         prior += angular_square(times_factor(found.rate, UNSURE))
     take_mismatch(state, prior, of_scale)
     state.rejected = 0
@@ -72,6 +74,22 @@ def learn_mismatch(node: Any) -> None:
         trust.cycles = 0
     trust.fault, trust.proving, trust.sane = found.fault, 1 if learnable else 0, 0
     guard.agreed = 0
+
+
+@kernel
+def doubt_step(node: Any, period: float) -> None:
+    """Of a step that no rest has confirmed a part may be the string's: a yaw is open by that while no aiding comes.
+
+    A string winds or unwinds no faster than ``UNWINDING``, and a larger step is the sensor's. Without this a node whose
+    aiding ends meanwhile would hold a false step for as sure as the noise of the aidings that showed it.
+    """
+    state, rate = node.filter, node.guard.unproven
+    if rate == 0 or state.last_aided == LONG_AGO:
+        return
+    age = state.now - max(state.last_aided, node.guard.rate_at)
+    if age > 2 * period:
+        before = angular_square(turned_angle(rate, age - period))
+        open_yaw(state, angular_square(turned_angle(rate, age)) - before)
 
 
 @kernel

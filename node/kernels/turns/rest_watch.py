@@ -51,8 +51,10 @@ def watch_rest(node: Any, settings: Any, at: float) -> None:
     if has_moved(state, node.config):
         if not is_tilting(state, node.config):
             take_bias(node, settings, since)
-    elif since == CYCLES:
-        calm_down(node, settings)
+    else:
+        guard.unproven = 0
+        if since == CYCLES:
+            calm_down(node, settings)
 
 
 @kernel
@@ -151,6 +153,7 @@ def take_bias(node: Any, settings: Any, since: int) -> None:
     state.rejected = 0
     guard.before_steps = NONE
     guard.step.fault = 0
+    guard.unproven = 0
     queue_event(node, BIAS_MOVED, event_degrees(moved_z, RATE_Q), NONE, NONE, NONE)
 
 

@@ -6,8 +6,14 @@ between two samples. No filter averages it away, for it is not white: what the i
 or in common with the one before, is systematic variance of the yaw. The variance of an aiding has it up to a limit
 only: a gain that falls as innovations grow would let the yaw go. A *jump* is a reset after aidings that all
 contradicted the yaw: either the string slipped or the encoder did, and the node cannot know which. What it jumped by
-stays systematic until it jumps back. A sensor whose window is not the cycle's is dated by its driver, which is a little
-off for as long as its crystal is.
+stays systematic until it jumps back.
+
+A sensor whose window is not the cycle's is dated by its driver, which is a little off: by the delay of the sensor's
+filter, that no data sheet tells exactly, and by the phase of its crystal. What stays of that, e, and the error d of the
+aidings' time stamp have one effect on an aiding, (e + d) w, so the filter's state of the time stamp learns their sum t
+on every ramp. But the yaw of the present is off by e w alone. Of two independent errors with the variances E and D the
+share s = E / (E + D) of the sum is the estimate of e, and E (1 - s) the variance that no aiding takes from it: a state
+without a row.
 """
 
 from __future__ import annotations
@@ -22,15 +28,22 @@ from node.kernels.arithmetic.operations import (
     angular_root,
     angular_square,
     as_number,
+    bounded_ratio,
     bounded_variance,
+    half_of,
     is_number,
     mean_of_total,
     quantity_ratio,
+    stamp_square,
+    stamp_time,
     time_of_cycles,
     times_factor,
     turned_angle,
+    turned_binary,
 )
-from node.kernels.arithmetic.quantity import NONE, factor_quantity, variance_quantity
+from node.kernels.arithmetic.quantity import NONE, ONE, factor_quantity, variance_quantity
+from node.kernels.filter.priors import stamp_var
+from node.kernels.filter.resets import turn_present
 from node.kernels.record.events import Code, event_degrees, event_number, queue_event
 from node.kernels.turns.swings import swing_var
 
@@ -71,9 +84,8 @@ def noise_var(node: Any) -> float:
 @kernel
 def unexplained_var(node: Any) -> float:
     """Variance (rad^2) of the yaw that no filter averages away: of misfit, ramps, the jump, of a late window."""
-    return bounded_variance(
-        misfit_var(node) + node.guard.ramp.doubt + angular_square(node.guard.jump) + window_var(node)
-    )
+    dated = passing_var(node) + delay_var(node)
+    return bounded_variance(misfit_var(node) + node.guard.ramp.doubt + angular_square(node.guard.jump) + dated)
 
 
 @kernel
@@ -97,6 +109,35 @@ def passing_var(node: Any) -> float:
         if is_dated(node)
         else 0
     )
+
+
+@kernel
+def delay_share(node: Any) -> float:
+    """Share of the time stamp's estimate that is the error of the windows' date; 0 where nothing stays of that."""
+    window = node.cluster.delayed[0]
+    if not is_dated(node) or half_of(window.std) >= window.lasting:
+        return 0
+    lasting = stamp_square(window.lasting)
+    return as_number(bounded_ratio(lasting, lasting + stamp_var(node.config)))
+
+
+@kernel
+def delay_var(node: Any) -> float:
+    """Variance (rad^2) of the yaw while the head turns, by what is left of that error once the share is put right."""
+    if not is_dated(node):
+        return 0
+    whole = angular_square(turned_angle(node.guard.rate, node.cluster.delayed[0].lasting))
+    return times_factor(whole, ONE - delay_share(node))
+
+
+@kernel
+def put_delay_right(node: Any) -> None:
+    """Turn the yaw of the present on by what the windows are late by beyond their date."""
+    share, state = delay_share(node), node.filter
+    if share != 0:
+        late = times_factor(stamp_time(state.stamp), share)
+        state.now_yaw = turned_binary(turned_angle(state.now_rate, late), state.now_yaw)
+        turn_present(node, times_factor(state.now_rate, share))
 
 
 @kernel

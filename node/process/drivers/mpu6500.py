@@ -20,7 +20,7 @@ from typing import Any, Final, Protocol, cast
 import numpy as np
 
 from node.errors import SensorError
-from node.process.drivers.fifo_window import Array, parts_of
+from node.process.drivers.fifo_window import Array, parts_of, window_std
 from node.process.drivers.frame_clock import FrameClock
 from node.process.drivers.source import ImuSample
 
@@ -169,7 +169,7 @@ class Mpu6500:
         if overflown:
             self._empty()
             self._frames.begin()
-        return replace(sample, late=end - shown, late_std=self._frames.std)
+        return replace(sample, late=end - shown, late_std=window_std(self._frames.std, self._delay))
 
     def close(self) -> None:
         """Release the bus."""

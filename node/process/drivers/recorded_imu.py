@@ -17,8 +17,8 @@ from node.errors import SensorError
 from node.kernels.sensors.correction import USUAL
 from node.process.drivers.source import ImuSample
 from telemetry.errors import RecordError
-from telemetry.records.column_names import FORCE, RATE
 from telemetry.records.imu_record import ImuRecord, read_imu_record
+from telemetry.records.known_columns import FORCE, RATE
 from telemetry.records.record_columns import OWN_NAMES
 from telemetry.records.record_reading import RecordReading
 from telemetry.records.understood_record import NO_FAULT, fault_phrases, understood_line

@@ -105,12 +105,12 @@ class Vn100:
 
     def _send(self, order: str) -> None:
         try:
-            os.write(self._file, f"${order}*{checksum(order.encode()):02X}\r\n".encode())
+            os.write(self._file, f"${order}*{line_checksum(order.encode()):02X}\r\n".encode())
         except OSError as error:
             raise SensorError(f"vn100: {self._path}: {error.strerror}") from error
 
 
-def checksum(text: bytes) -> int:
+def line_checksum(text: bytes) -> int:
     """Exclusive or of the bytes between ``$`` and ``*``."""
     found = 0
     for byte in text:
@@ -125,7 +125,7 @@ def checked_words(line: bytes) -> list[str] | None:
     if not star or dollar < 0:
         return None
     try:
-        right = int(given, 16) == checksum(body[dollar + 1 :])
+        right = int(given, 16) == line_checksum(body[dollar + 1 :])
         return body[dollar + 1 :].decode("ascii").split(",") if right and len(given) == 2 else None
     except ValueError:
         return None

@@ -14,6 +14,7 @@ from typing import Any
 from sim.studies.scenarios import Tables, change_sections, complete_string
 
 BLOCKS = 2
+FEWEST, LARGEST = 5, 8  # disturbances of a bad day
 FINE_HZ = 1000.0  # of the samples where something vibrates
 BASE: Tables = {
     "rig": complete_string(1),
@@ -33,7 +34,10 @@ MPU = {"frames_hz": 50.0, "low_pass_hz": 20.0}
 
 @dataclass(frozen=True, slots=True)
 class DisturbanceCase:
-    """One row. ``unseen``: reason for which one node by itself cannot observe it, if any."""
+    """One row, whose constants may be drawn (``sim.studies.field.drawn_constants``).
+
+    ``unseen``: reason for which one node by itself cannot observe it, if any.
+    """
 
     key: str
     name: str
@@ -41,6 +45,9 @@ class DisturbanceCase:
     unseen: str = ""
     by_ground: bool = False  # the ground station makes up for it, so it is judged by what comes of the surveys there
     true_faults: tuple[str, ...] = ()  # of sensors, which this world has
+    judges_ramps: bool = False  # the first seconds of a turning count too
+    has_state: bool = False  # the filter estimates it, so it is to be sharp
+    mild: tuple[Tables, ...] = ()  # of which ``FEWEST`` to ``LARGEST`` come together
 
 
 def _rough(hertz: float = 250.0, **sections: Mapping[str, Any]) -> Tables:
@@ -147,4 +154,3 @@ CASES = (
     ),
 )
 ALL = "all"
-KEYS = (ALL, *(case.key for case in CASES))

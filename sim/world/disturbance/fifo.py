@@ -13,7 +13,7 @@ import numpy as np
 
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import PARTS
-from node.process.drivers.fifo_window import parts_of
+from node.process.drivers.fifo_window import parts_of, window_std
 from node.process.drivers.frame_clock import FrameClock
 from sim.world.disturbance.converter import AT_RANGE, FORCE_CLIPPED, GYRO_CLIPPED
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, Flags, ImuSamples, Mask, OneImu
@@ -81,8 +81,10 @@ def mean_between(t: Array, values: Array, stamps: Array) -> Array:
 
 def stamps_of(imu: OneImu, ends: Array) -> Array:
     """When each reading was really taken (m + 1,), s: the node believes the begin and the ``ends`` of cycles."""
-    jitter = 1e-3 * imu.rough.sensor.jitter_ms
+    sensor = imu.rough.sensor
+    jitter = 1e-3 * sensor.jitter_ms
     stamps = np.concatenate([[ends[0] - PERIOD], ends])
+    stamps += np.where(stamps > imu.file.schedule.begin_s + sensor.stamp_step_s, 1e-3 * sensor.stamp_step_ms, 0.0)
     if jitter == 0.0:
         return stamps
     return np.asarray(stamps + jitter * imu.random(RandomStream.ROUGH_JITTER).standard_normal(len(stamps)))
@@ -104,7 +106,7 @@ def read_fifo(frames: ImuSamples, imu: OneImu) -> FifoReads:
     parts = np.full((count, PARTS + 1), np.nan)
     for k, (end, found) in enumerate(zip(ends.tolist(), np.diff(cuts).tolist(), strict=True)):
         clock.on_read(end, found)
-        late[k], std[k] = end - clock.end, clock.std
+        late[k], std[k] = end - clock.end, window_std(clock.std, sensor.delay)
         window = (clock.end - sensor.delay - found * clock.period, clock.end - sensor.delay)
         if k > 0 and (told := parts_of(frames.rate[cuts[k] : cuts[k + 1], 2], window, end - PERIOD, end)):
             parts[k] = told
@@ -137,4 +139,8 @@ FRAMES = Disturbance(
     compiled=Compiled(),
     beyond=needs_frames,
 )
-JITTER = Disturbance("jitter", ("rough.sensor.jitter_ms",), ActsOn.TAKING)
+JITTER = Disturbance(
+    "jitter",
+    ("rough.sensor.jitter_ms", "rough.sensor.stamp_step_ms", "rough.sensor.stamp_step_s"),
+    ActsOn.TAKING,
+)

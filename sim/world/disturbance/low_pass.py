@@ -37,9 +37,16 @@ def filter_signal(samples: ImuSamples, imu: OneImu, _: None) -> None:
 def needs_filter(file: ScenarioFile) -> dict[str, bool]:
     """Frames lie between those of a finer grid, on which nothing is smooth that no filter has passed."""
     sensor = None if file.rough is None else file.rough.sensor
-    return {"rough.sensor.low_pass_hz = 0": sensor is not None and sensor.frames_hz > 0.0 == sensor.low_pass_hz}
+    off = sensor is not None and sensor.delay_off_ms != 0.0
+    rough = sensor is not None and sensor.frames_hz > 0.0 == sensor.low_pass_hz
+    return {"rough.sensor.low_pass_hz = 0": rough, "rough.sensor.delay_off_ms": off}
 
 
 LOW_PASS = Disturbance(  # a campaign has the frames of a perfect sensor behind it, ``sim.world.disturbance.frame_sums``
-    "low-pass", ("rough.sensor.low_pass_hz",), ActsOn.GRID, filter_signal, compiled=Compiled(), beyond=needs_filter
+    "low-pass",
+    ("rough.sensor.low_pass_hz", "rough.sensor.delay_off_ms"),
+    ActsOn.GRID,
+    filter_signal,
+    compiled=Compiled(),
+    beyond=needs_filter,
 )

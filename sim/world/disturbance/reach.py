@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from sim.world.disturbance.vibration import G
-from sim.world.rough_motion import BACK_WITHIN, RUN_ON, WIND
+from sim.world.rough_motion import BACK_WITHIN, WIND
 from sim.world.rough_section import RoughSection
 from sim.world.scenario_file import ScenarioFile
 
@@ -20,7 +20,7 @@ def most_turning(file: ScenarioFile, rough: RoughSection) -> float:
     rotation, drive = file.rotation, rough.drive
     swung = (drive.ripple * drive.ripple_s + drive.stick_slip * drive.stick_slip_s) / math.pi
     driven = rotation.rate_dps * (1.0 + drive.ripple + SLIP * drive.stick_slip) + rotation.acceleration_dps2 * swung
-    play, back = rough.string.backlash_deg / RUN_ON, drive.turns_back_deg / BACK_WITHIN
+    play, back = rough.string.backlash_deg / rough.string.run_on_s, drive.turns_back_deg / BACK_WITHIN
     unwinding = rough.string.twist_deg / min(WIND, rough.string.unwind_s or WIND)
     return driven + STEPPING * (play + back + unwinding)
 

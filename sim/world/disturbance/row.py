@@ -30,6 +30,7 @@ Constants = Mapping[str, Any]  # by the name of the row that drew them
 class ActsOn(enum.Enum):
     """Where on its way from the tube to the reading a disturbance acts."""
 
+    DISC = "angle that the encoder's disc shows, on the grid of a rough world; the tube is 0, the drive head"
     MOTION = "angle of a tube about its axis, on the grid of a rough world"
     FELT = "what the housing of an IMU feels: means of cycles, or the grid of a rough world"
     GRID = "the signal before the converter's filter, on the grid of a rough world"
@@ -121,7 +122,7 @@ class ImuSamples:
 
 @dataclass(slots=True, eq=False)
 class TubeMotion:
-    """Angle of a tube about its axis, as it is being made.
+    """Angle of a tube about its axis, or of the encoder's disc, as it is being made.
 
     Attributes
     ----------
@@ -133,6 +134,10 @@ class TubeMotion:
     t: Array
     angle: Array
     driven: Array
+
+    def stops(self) -> Array:
+        """Rig times (k,) s at which a turning ends."""
+        return np.asarray(self.t[1:][np.diff(self.driven) < 0.0])
 
 
 class CycleNow(NamedTuple):
@@ -188,7 +193,7 @@ class Disturbance:
     name : said of it in tables and tests; of a new one also its table ``[disturbance.NAME]`` in a scenario
     keys : of a scenario that it owns; one that names a table owns all of it
     acts_on : where it acts
-    act : array form ``act(samples, imu, drawn)``, or ``act(motion, imu, drawn)`` on ``MOTION``
+    act : array form ``act(samples, imu, drawn)``, or ``act(motion, imu, drawn)`` on ``DISC`` and ``MOTION``
     draw : constants of one IMU from its streams
     compiled : form for a campaign; None: a campaign refuses its keys
     beyond : by key, whether a scenario goes beyond what the compiled form can do

@@ -12,6 +12,7 @@ from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import PARTS
 from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, SATURATED, SPLIT, TEMPERATURE
 from node.kernels.sensors.correction import USUAL
+from node.process.drivers.fifo_window import OFF
 from sim.kernel import kernel, shared_body
 from sim.world.disturbance.chain import chain_forms, count_drawn
 from sim.world.disturbance.disturbance_table import TABLE
@@ -126,6 +127,14 @@ def move_tube(motion: TubeMotion, imu: OneImu) -> Array:
     return motion.angle
 
 
+def show_disc(motion: TubeMotion, head: OneImu) -> Array:
+    """Angle (n,) rad that the encoder's disc shows, of what it turns by; ``head`` is of tube 0."""
+    for row in TABLE:
+        if row.acts_on is ActsOn.DISC and row.act is not None:
+            row.act(motion, head, None if row.draw is None else row.draw(head))
+    return motion.angle
+
+
 @kernel
 def read_sensors(
     shared: Any,
@@ -215,7 +224,8 @@ def read_frames(
         length = borders[piece + 1] - borders[piece]
         row[BEHIND + piece] = (after - before + parts[piece]) / length + even if length > 0.0 else 0.0
         before = after
-    row[LATE], row[LATE_STD] = late, field.times.late_std[place, cycle]
+    row[LATE] = late
+    row[LATE_STD] = math.hypot(field.times.late_std[place, cycle], OFF * front.delay)
     row[SPLIT] = 1.0 if pieces > 1 else 0.0
 
 

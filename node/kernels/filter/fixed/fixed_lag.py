@@ -128,9 +128,7 @@ def advance_epoch(state: Any, config: Any, cycle: int, until: int) -> None:
     if state.smoothing == 1 and state.down[2] < INVERTED_DOWN:
         state.surveyed_with[PSI] = 0
     if gap > MISSED_GAP:
-        # cycles were lost: the rate of this one stands for them, and is not trusted further than its own size
-        missed = gap_angle(state.ring_rate[cycle & SLOT, 2], gap_held(state, gap))
-        widen_variance(state, state.P, PSI, missed * missed)
+        widen_variance(state, state.P, PSI, missed_var(state, cycle, gap))
     while dt > 0:
         piece = min(dt, LONGEST_STEP)
         dt -= piece
@@ -138,6 +136,16 @@ def advance_epoch(state: Any, config: Any, cycle: int, until: int) -> None:
         for k in range(3):
             state.bias[k] = multiply_q31(state.bias[k], state.decay[k])
     state.epoch = until
+
+
+@kernel
+def missed_var(state: Any, cycle: int, gap: int) -> int:
+    """Variance (rad^2, Q56) of the yaw by a ``gap`` (s, Q28) of cycles lost before ``cycle``: of the faster side."""
+    fastest = abs(state.ring_rate[cycle & SLOT, 2])
+    if cycle > 0:
+        fastest = max(fastest, abs(state.ring_rate[(cycle - 1) & SLOT, 2]))
+    missed = gap_angle(fastest, gap_held(state, gap))
+    return int(missed * missed)
 
 
 @kernel
@@ -283,8 +291,11 @@ def predict_to_now(state: Any, config: Any) -> None:
         end = state.ring_end[cycle & SLOT]
         dt = gap_held(state, end - state.now)
         if dt > 0:
+            gap = state.ring_start[cycle & SLOT] - state.now
             state.now_yaw = integrate_cycle(
                 state, config, cycle, end - dt, end, int(state.now_yaw), state.now_down, state.now_P
             )
+            if gap > MISSED_GAP:
+                widen_variance(state, state.now_P, PSI, missed_var(state, cycle, gap))
             state.now = end
     state.now_rate = true_rate_z(state, state.ring_rate[(state.cycles - 1) & SLOT, 2])

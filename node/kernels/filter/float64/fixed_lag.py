@@ -7,7 +7,7 @@ copy of itself to the present. Staying behind also tells from the next cycle whe
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 from node.kernels.arithmetic.angles import advance_binary, from_binary, to_binary, wrap_angle
 from node.kernels.arithmetic.formats import Array
@@ -32,6 +32,7 @@ PSI, BZ, D = kernel_constant(Err.YAW), kernel_constant(Err.BIAS_Z), kernel_const
 AIDED, REJECTED, YAW_RESET = int(CycleStatus.AIDED), int(CycleStatus.REJECTED), int(CycleStatus.YAW_RESET)
 LATE_DROPPED = int(CycleStatus.LATE_DROPPED)
 BX = kernel_constant(Err.BIAS_X)
+MISSED_GAP: Final = 1e-3  # s, between two cycles of which none was lost
 
 
 @kernel
@@ -99,13 +100,24 @@ def advance_epoch(state: Any, config: Any, cycle: int, until: float) -> None:
     state.yaw = integrate_cycle(state, config, cycle, state.epoch, until, state.yaw, state.down, state.P)
     if state.smoothing == 1 and state.down[2] < INVERTED:
         state.surveyed_with[PSI] = 0.0
-    if gap > 1e-3:
-        # cycles were lost: the rate of this one stands for them, and is not trusted further than its own size
-        missed = state.ring_rate[cycle % RING, 2] * gap
-        state.P[PSI, PSI] += missed * missed
+    if gap > MISSED_GAP:
+        state.P[PSI, PSI] += missed_var(state, cycle, gap)
     for k in range(3):
         state.bias[k] *= 2.718281828459045 ** (-dt / config.bias_tau[k])
     state.epoch = until
+
+
+@kernel
+def missed_var(state: Any, cycle: int, gap: float) -> float:
+    """Variance (rad^2) of the yaw by a ``gap`` (s) of cycles that were lost before ``cycle``.
+
+    The rate on one side of the gap stands for what it hides, and is not trusted further than the larger of the two: a
+    drive that starts or stops inside the gap shows on one side alone.
+    """
+    fastest = abs(state.ring_rate[cycle % RING, 2])
+    if cycle > 0:
+        fastest = max(fastest, abs(state.ring_rate[(cycle - 1) % RING, 2]))
+    return float((fastest * gap) ** 2)
 
 
 @kernel
@@ -269,9 +281,12 @@ def predict_to_now(state: Any, config: Any) -> None:
         slot = cycle % RING
         end = state.ring_end[slot]
         if end > state.now:
+            gap = state.ring_start[slot] - state.now
             state.now_yaw = integrate_cycle(
                 state, config, cycle, state.now, end, state.now_yaw, state.now_down, state.now_P
             )
+            if gap > MISSED_GAP:
+                state.now_P[PSI, PSI] += missed_var(state, cycle, gap)
             state.now = end
     newest = (state.cycles - 1) % RING
     state.now_rate = (state.ring_rate[newest, 2] - state.static_bias[2] - state.bias[2]) / (1.0 + state.scale)
