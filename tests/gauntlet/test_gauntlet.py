@@ -195,3 +195,14 @@ def test_one_seed_is_one_object() -> None:
     row, figures = map(json.loads, shown.output.splitlines())
     assert (row["seed"], row["faults"], row["violations"]) == (3, ["loss"], [])
     assert (figures["seeds"], figures["failed"]) == (1, 0)
+
+
+def test_a_gyroscope_of_a_wrong_scale_is_not_taken_for_an_encoder_that_stands() -> None:
+    """At the stop it turns by the step that its bias took for the scale: it has changed itself, and surveys."""
+    outcome = run_seed(3, kinds=["gyro-scale"])
+    assert (outcome.measurements, outcome.violations) == (2, [])
+    assert "survey_missing" not in outcome.told
+
+
+def test_an_encoder_that_dies_is_told_as_the_encoder_whichever_tube_calls_it_what() -> None:
+    assert "reference" in run_seed(3, kinds=["encoder-dead"]).told

@@ -27,7 +27,12 @@ def test_two_settled_tubes_that_contradict_the_encoder_are_told_once() -> None:
     assert told([*BOTH_STARTED, event(1, 100.0, "yaw_reset"), event(2, 101.0, "yaw_reset")]) == ["tubes 1, 2 at 100 s"]
 
 
-@pytest.mark.parametrize("code", ["yaw_reset", "gyro_step", "gyro_scale"])
+def test_a_counter_that_one_tube_sees_stand_and_another_takes_for_its_own_step_is_told() -> None:
+    stands, step = event(1, 100.0, "encoder_stands"), event(2, 101.0, "gyro_step")
+    assert told([*BOTH_STARTED, stands, step]) == ["tubes 1, 2 at 100 s"]
+
+
+@pytest.mark.parametrize("code", ["yaw_reset", "gyro_step", "gyro_scale", "encoder_stands"])
 def test_a_gyroscope_that_stands_alone_against_the_encoder_and_another_tube_is_wrong_itself(code: str) -> None:
     assert told([*BOTH_STARTED, event(1, 100.0, code)]) == []
 

@@ -17,7 +17,7 @@ from telemetry.application.series import SERIES_SHIFT
 from telemetry.frozen import replace
 from telemetry.messages import EPOCH_UNKNOWN, Event
 
-AGAINST_THE_ENCODER = ("yaw_reset", "gyro_step", "gyro_scale")
+AGAINST_THE_ENCODER = ("yaw_reset", "gyro_step", "gyro_scale", "encoder_stands")
 STARTS = ("booted", "restored")
 REJECTED = "aiding_rejected"  # the first of a row of aidings that contradict a yaw, up to its reset
 SEEN_LATER = 10.0  # s from there to a gyroscope that is found to give nothing: it gave nothing then

@@ -123,11 +123,13 @@ def stands_still(node: Any) -> bool:
     """Whether the counter stands while the head turns, which is told once: the gyroscope goes on as it did before.
 
     Of two that part the one that has changed is in doubt. A gyroscope that stood still in this rest, or repeats itself,
-    has changed itself. One aiding proves nothing: a head that stopped dead was turning in the node's newest cycle.
+    or has taken a step without which it stands too, has changed itself. One aiding proves nothing: a head that stopped
+    dead was turning in the node's newest cycle.
     """
     state, guard = node.filter, node.guard
     goes_on = guard.rate == 0 and abs(state.now_rate) > SLOWEST_STOOD and state.yaw_known == 1
-    changed = is_faulty(guard.gyro) or guard.readings.rates.counts[2] > 0 or stood_in_this_rest(node)
+    changed = is_faulty(guard.gyro) or guard.readings.rates.counts[2] > 0
+    changed = changed or stood_in_this_rest(node) or stands_without_step(node)
     if not goes_on or changed or state.mode == STATIC_BIAS:
         guard.stands = 0
         return False
@@ -139,6 +141,15 @@ def stands_still(node: Any) -> bool:
     guard.rate, guard.rate_at = state.now_rate, LONG_AGO  # its word is not taken, neither for a rest nor for a turn
     reset_aiding_watch(guard.aidings)
     return True
+
+
+@kernel
+def stands_without_step(node: Any) -> bool:
+    """Whether the gyroscope turns by nothing but the steps that its constant bias took since the last rest."""
+    state, before = node.filter, node.guard.before_steps
+    if not is_number(before):
+        return False
+    return bool(abs(state.now_rate + state.static_bias[2] - before) < SLOWEST_STOOD)
 
 
 @kernel
