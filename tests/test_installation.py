@@ -142,7 +142,7 @@ def test_all_is_every_extra_of_an_installation(wheel: Path) -> None:
     asked = [Requirement(text) for text in requirements(wheel)]
     parts = {
         extra: {r.name for r in asked if r.marker is not None and r.marker.evaluate({"extra": extra})}
-        for extra in ("all", "board", "campaign", "can", "ground", "postgresql")
+        for extra in ("all", "board", "campaign", "can", "files", "ground", "postgresql")
     }
     assert parts.pop("all") == set().union(*parts.values())
 
@@ -243,7 +243,7 @@ def board(wheel: Path, tmp_path: Path) -> Iterator[Environment]:
 
 
 def test_a_board_runs_its_node_without_the_other_packages(board: Environment) -> None:
-    (board.folder / "imu.csv").write_text("0,0,0,0,0,0,-9.81\n" * 600)
+    (board.folder / "imu.csv").write_text("".join(f"{k / 1.9},0,0,0,0,0,-9.81\n" for k in range(600)))
     endpoint = free_endpoint()
     own = ("--clock", "own", "--imu", "replay:imu.csv", "--above", "encoder", "--endpoint", endpoint)
     frames: queue.SimpleQueue[bytes] = queue.SimpleQueue()

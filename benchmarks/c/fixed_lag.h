@@ -75,6 +75,15 @@ static uint32_t turn(const State *state, const Config *config, int64_t cycle, do
     return advance_binary(yaw, turned);
 }
 
+/* Variance of the yaw by a gap (s) of lost cycles before a cycle: the faster rate of its two sides, as large as itself. */
+static double missed_var(const State *state, int64_t cycle, double gap)
+{
+    double fastest = fabs(state->ring_rate[cycle % RING][2]);
+    if (cycle > 0)
+        fastest = larger(fastest, fabs(state->ring_rate[(cycle - 1) % RING][2]));
+    return square(fastest * gap);
+}
+
 static void advance(State *state, const Config *config, int64_t cycle, double until)
 {
     double dt = until - state->epoch;
@@ -83,7 +92,7 @@ static void advance(State *state, const Config *config, int64_t cycle, double un
     double gap = state->ring_start[cycle % RING] - state->epoch;
     state->yaw = turn(state, config, cycle, state->epoch, until, state->yaw, state->down, state->P);
     if (gap > 1e-3)
-        state->P[PSI][PSI] += square(state->ring_rate[cycle % RING][2] * gap);
+        state->P[PSI][PSI] += missed_var(state, cycle, gap);
     for (int k = 0; k < 3; k++)
         state->bias[k] *= exp(-dt / config->bias_tau[k]);
     state->epoch = until;
@@ -238,7 +247,10 @@ static void predict_to_now(State *state, const Config *config)
     for (int64_t cycle = state->consumed; cycle < state->cycles; cycle++) {
         double end = state->ring_end[cycle % RING];
         if (end > state->now) {
+            double gap = state->ring_start[cycle % RING] - state->now;
             state->now_yaw = turn(state, config, cycle, state->now, end, state->now_yaw, state->now_down, state->now_P);
+            if (gap > 1e-3)
+                state->now_P[PSI][PSI] += missed_var(state, cycle, gap);
             state->now = end;
         }
     }

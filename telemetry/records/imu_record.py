@@ -92,6 +92,10 @@ class ImuRecord:
     def _known_stamps(self) -> RowTimes:
         if self.stamps is None:
             raise LoggerError(f"{self.name}: has no column of times: expected its rate (rows a second)")
+        if self.stamps.period <= 0.0:
+            raise LoggerError(
+                f"{self.name}: its times stand still: expected times that grow, or a rate (rows a second)"
+            )
         return self.stamps
 
 

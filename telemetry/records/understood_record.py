@@ -74,7 +74,8 @@ def _stamps(record: ImuRecord) -> list[str]:
     stamps = record.stamps
     if stamps is None:
         return ["no times and no rate"]
-    length = f"{stamps.times[-1] - stamps.times[0]:.1f} s at {1.0 / stamps.period:.4g} Hz"
+    rate = f"{1.0 / stamps.period:.4g} Hz" if stamps.period > 0.0 else "no rate, for its clock stands"
+    length = f"{stamps.times[-1] - stamps.times[0]:.1f} s at {rate}"
     if TIME not in record.placed:
         return [f"{length} as told"]
     one = record.placed[TIME]

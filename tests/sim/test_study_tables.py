@@ -145,8 +145,9 @@ def test_every_study_runs_with_few_seeds_and_keeps_what_its_line_says(study: Stu
     assert done.exit_code == 0, done.output
     result = json.loads(done.stdout)
     assert "traces" not in result
+    # of the study of the field one disturbance was asked, which is in one of its two worlds
+    assert sum(not result[table.rows] for table in study.tables) <= (study.name == "field")
     for table in study.tables:
-        assert result[table.rows]
         if table.kept:
             name = f"{result['experiment']}{table.suffix}.csv"
             with (tmp_path / name).open(newline="") as file:

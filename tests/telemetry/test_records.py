@@ -390,3 +390,12 @@ def test_no_row_is_later_than_its_stamp_and_rows_ascend(delays: list[float], per
     if found.bursts is not None:
         assert np.all(found.times <= stamps + 1e-9)
         assert np.all(np.diff(found.times) > 0.0)
+
+
+def test_times_that_stand_still_are_refused_and_shown(tmp_path: Path) -> None:
+    path = tmp_path / "imu.csv"
+    path.write_text("0,0,0,0,0,0,-9.81\n" * 600)
+    record = read_imu_record(*read_told(str(path)))
+    with pytest.raises(LoggerError, match=r"imu.csv: its times stand still: expected times that grow, or a rate"):
+        record.times()
+    assert "no rate, for its clock stands" in understood_line(record)

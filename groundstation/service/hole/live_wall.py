@@ -18,6 +18,7 @@ from groundstation.survey.wall.column_plans import ColumnPlan, ColumnStatus, Col
 from groundstation.survey.wall.judged_wall import judge_wall, part_around
 from groundstation.survey.wall.wall_columns import build_wall
 from groundstation.survey.wall.wall_file import Wall, read_wall
+from groundstation.survey.wall.wall_plausibility import wall_warnings
 from groundstation.survey.wall.wall_verdict import Judgement
 
 NO_SURVEY = ColumnSurvey(*np.zeros((3, 0)))
@@ -88,7 +89,8 @@ class LiveWall:
         holes[own] = survey.turned(file.stations_turn) if len(survey.md) > 1 else NO_SURVEY
         try:
             built = build_wall(plans, holes, file.assumed, self._wall.built)
-            wall = replace(self._wall, plans=plans, holes=holes, built=built)
+            warnings = wall_warnings(plans, holes, self._wall.pairs)
+            wall = replace(self._wall, plans=plans, holes=holes, built=built, warnings=warnings)
             return Neighbourhood(wall, own, judge_wall(wall, own))
         except SurveyError as error:
             return Neighbourhood(self._wall, own, None, str(error))

@@ -137,7 +137,7 @@ def test_each_path_wanders_as_its_own_instrument_leaves_it(tmp_path: Path, forgo
     for mine, theirs, times in (("relay", "mwd-rev4", 1), ("mwd-rev4", "relay", 1), ("relay", "relay", 2)):
         request = ClearanceRequest(
             record, record, instrument=mine, offset_instrument=theirs, offset_head=(0.0, 9.0, 0.0),
-            curvature_length_m=forgotten_m,
+            curvature_length_m=forgotten_m, site=SiteFigures(field_nt=49_000.0, dip_deg=66.0, declination_deg=2.5),
         )  # fmt: skip
         moved, still = (
             answer_clearance(one)["stations"][-1]["sigma_m"] ** 2
