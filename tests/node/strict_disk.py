@@ -91,7 +91,7 @@ class StrictDisk:
         return id(self.seen[path.name]) if path.name in self.seen else 0
 
     def connect(self, path: Path) -> sqlite3.Connection:
-        raise NotImplementedError
+        raise AssertionError("expected files alone on this disk, got a database")
 
     def after_cut(self, left: Left) -> StrictDisk:
         """The disk that is found when the power is back."""

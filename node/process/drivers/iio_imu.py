@@ -21,6 +21,7 @@ from node.errors import SensorError
 from node.kernels.sensors.correction import USUAL
 from node.process.drivers.fifo_window import parts_of
 from node.process.drivers.source import ImuSample
+from node.process.drivers.waiting_bytes import read_waiting
 
 Array = npt.NDArray[np.float64]
 SYSFS, DEVICES = Path("/sys/bus/iio/devices"), Path("/dev")
@@ -28,7 +29,6 @@ WANTED: Final = tuple(f"in_{kind}_{axis}" for kind in ("anglvel", "accel") for a
 STAMP, WARMTH = "in_timestamp", "in_temp"
 TYPE: Final = re.compile(r"([bl]e):([su])(\d+)/(\d+)(?:X\d+)?>>(\d+)")
 LENGTH: Final = 2048  # frames of the kernel's buffer
-CHUNK: Final = 1 << 16  # bytes of a read
 LOST: Final = 2.5  # usual steps of the stamps, from which on frames are missing
 SHORTEST: Final = 0.5  # of the frames of a cycle
 USUAL_RATE: Final = 100.0  # Hz, of a device that does not say its own
@@ -151,20 +151,13 @@ class IioImu:
         """Frames (n, size) that the kernel holds."""
         if self._file < 0:
             raise SensorError(f"iio: {self._name}: not started")
-        data = bytearray(self._rest)
-        while True:
-            try:
-                got = os.read(self._file, CHUNK)
-            except BlockingIOError:
-                break
-            except OSError as error:
-                raise SensorError(f"iio: {self._name}: {error.strerror}: the device is gone") from error
-            if not got:
-                break
-            data += got
+        try:
+            data = self._rest + read_waiting(self._file)
+        except OSError as error:
+            raise SensorError(f"iio: {self._name}: {error.strerror}: the device is gone") from error
         count = len(data) // self._size
-        self._rest = bytes(data[count * self._size :])
-        return np.frombuffer(bytes(data[: count * self._size]), dtype=np.uint8).reshape(count, self._size)
+        self._rest = data[count * self._size :]
+        return np.frombuffer(data[: count * self._size], dtype=np.uint8).reshape(count, self._size)
 
     def _found(self) -> Path:
         """Folder of the device in sysfs."""

@@ -17,11 +17,11 @@ import numpy as np
 
 from node.errors import SensorError
 from node.process.drivers.source import ImuSample
+from node.process.drivers.waiting_bytes import read_waiting
 
 RATE: Final = 100  # Hz, of its lines
 IMU_LINES: Final = 19  # of register 6
 SPEED: Final = termios.B115200
-CHUNK: Final = 1 << 14
 FIELDS: Final = 11  # numbers of a line
 SHORTEST: Final = 0.5  # of the lines of a cycle
 LARGEST_RATE, LARGEST_FORCE = 34.9, 157.0  # rad/s and m/s^2, of 2000 deg/s and 16 g
@@ -80,18 +80,11 @@ class Vn100:
         """Numbers of the lines that have come, and what other lines there were."""
         if self._file < 0:
             raise SensorError(f"vn100: {self._path}: not started")
-        data = bytearray(self._rest)
-        while True:
-            try:
-                got = os.read(self._file, CHUNK)
-            except BlockingIOError:
-                break
-            except OSError as error:
-                raise SensorError(f"vn100: {self._path}: {error.strerror}: the line is gone") from error
-            if not got:
-                break
-            data += got
-        *lines, self._rest = bytes(data).split(b"\n")
+        try:
+            data = self._rest + read_waiting(self._file)
+        except OSError as error:
+            raise SensorError(f"vn100: {self._path}: {error.strerror}: the line is gone") from error
+        *lines, self._rest = data.split(b"\n")
         rows, others = [], set()
         for line in lines:
             words = checked_words(line)
