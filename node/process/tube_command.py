@@ -23,10 +23,11 @@ def node(request: TubeRequest, ends: EndsRequest, place: PlaceRequest) -> None:
       borechain node --tube 2 --clock own --imu mpu6500:1 --upper can:can0 --lower can:can1
     """
     from node.process.drivers.choice import imu_source
+    from node.process.drivers.mpu_chips import CHIPS
     from node.process.node_host import run_node
 
     sources = request.imus.sources
-    if any(source.startswith("mpu6500") for source in sources):
+    if any(source.partition(":")[0] in CHIPS for source in sources):
         check_installed("smbus2")
     settings = request.to_settings()
     own_time = ends.to_own_time(request.tube, ("--imu", sources))

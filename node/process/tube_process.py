@@ -28,6 +28,7 @@ from node.process.drivers.source import ImuSource, SafeImu
 from node.process.reading import reading_from, reading_of
 from node.process.saver import Saver
 from node.process.survey_log import SurveyLog
+from node.process.temperature_watch import TemperatureWatch
 from telemetry.application.endpoint import REPORT_EVERY, Endpoint
 from telemetry.application.seal_watch import SealWatch
 from telemetry.errors import EncodeError
@@ -143,6 +144,7 @@ class TubeProcess(Process):
             restored=restored,
             parameters=parameters,
         )
+        self._warmth = TemperatureWatch(self._send_event, settings.imus, lambda: self.tube.parameters)
         self._commands = CommandHandlers(self.tube, timing, self._resend)
         self._now = 0.0
         self._announced = False
@@ -185,6 +187,7 @@ class TubeProcess(Process):
             start, samples = reading.start, [imu.read(reading.start, now) for imu in self._imus]
             first, *others = [reading_from(sample, start, now) for sample in samples]
             reading = replace(first, others=tuple(others))
+        reading = self._warmth.look(reading)
         self._lap(CycleStage.READ)
         context = self._context(now)
         if context.synchronised:

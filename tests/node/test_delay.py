@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from emulated_mpu6500 import EmulatedMpu6500
+from emulated_mpu import EmulatedMpu
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,7 +12,8 @@ from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.record.node_record import DELAYED
 from node.kernels.sensors.delay import date_window, make_up_delay
 from node.process.drivers.frame_clock import FrameClock
-from node.process.drivers.mpu6500 import DELAYS, Mpu6500
+from node.process.drivers.mpu_chips import DELAYS
+from node.process.drivers.mpu_imu import MpuImu
 from sim.studies.field.cases import CASES
 from sim.studies.field.run import disturbance_row, run_seed
 
@@ -142,8 +143,8 @@ def test_the_crystal_and_the_phase_of_the_frames_are_found(crystal: float, phase
 
 
 def test_the_driver_says_how_late_its_window_is() -> None:
-    chip = EmulatedMpu6500()
-    driver = Mpu6500(chip.connect, sleep=lambda _: None)
+    chip = EmulatedMpu()
+    driver = MpuImu(chip.connect, sleep=lambda _: None)
     driver.start()
     late = []
     for k in range(1, 200):

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from emulated_mpu6500 import CAPACITY, EmulatedMpu6500
+from emulated_mpu import CAPACITY, EmulatedMpu
 
 from node.errors import SensorError
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.process.drivers.frame_clock import FrameClock
-from node.process.drivers.mpu6500 import Mpu6500
+from node.process.drivers.mpu_imu import MpuImu
 from node.process.drivers.quadrature import LARGEST_JUMP, QuadratureFile
 from node.process.drivers.timed import TimedImu
 
@@ -20,9 +20,9 @@ RATE, FORCE, GYRO, ACCELEROMETER = (0.0, 0.0, 1.0 * DEG), (0.2, -0.3, -9.7), 1, 
 LIMIT = 2000.0 * DEG, 1000.0
 
 
-def driver() -> tuple[EmulatedMpu6500, Mpu6500]:
-    chip = EmulatedMpu6500()
-    made = Mpu6500(chip.connect, sleep=lambda _: None)
+def driver() -> tuple[EmulatedMpu, MpuImu]:
+    chip = EmulatedMpu()
+    made = MpuImu(chip.connect, sleep=lambda _: None)
     made.start()
     return chip, made
 
@@ -58,11 +58,12 @@ def test_a_fifo_is_read_up_to_the_last_frame_that_it_holds(spare: int) -> None:
             assert one.read(0.0, end).rate[2] == pytest.approx(RATE[2], rel=0.02)
 
 
-def test_a_count_of_exactly_the_capacity_is_no_overflow() -> None:
+def test_a_count_of_exactly_the_capacity_is_no_overflow_and_no_whole_frames() -> None:
     chip, one = driver()
     chip.fifo += bytes(CAPACITY)
     one._fresh = False
-    assert one.read(0.0, 36 * 0.02).rate == (0.0, 0.0, 0.0)
+    with pytest.raises(SensorError, match="8 bytes beyond 36 whole frames in the FIFO"):
+        one.read(0.0, 36 * 0.02)
 
 
 @pytest.mark.parametrize(("low_pass", "delay"), [(184, 2.9e-3), (20, 9.9e-3), (5, 33.48e-3)])
@@ -70,8 +71,8 @@ def test_what_is_shown_is_earlier_by_the_delay_of_the_low_pass(low_pass: int, de
     """Register map, revision 2.1, delays of the gyroscope: the motion that a frame shows was that much before it."""
     found = {}
     for which in (low_pass, 92):  # 3.9 ms
-        chip = EmulatedMpu6500()
-        one = Mpu6500(chip.connect, low_pass=which, sleep=lambda _: None)
+        chip = EmulatedMpu()
+        one = MpuImu(chip.connect, low_pass=which, sleep=lambda _: None)
         one.start()
         for k in range(1, 40):
             chip.live(PERIOD, RATE, FORCE)

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from emulated_mpu6500 import EmulatedMpu6500
+from emulated_mpu import EmulatedMpu
 
 from node.errors import NodeConfigurationError, SensorError
 from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.process.drivers.choice import encoder_source, imu_source
-from node.process.drivers.mpu6500 import Mpu6500, open_bus
+from node.process.drivers.mpu_imu import MpuImu, open_bus
 from node.process.drivers.quadrature import QuadratureFile
 from node.process.drivers.replay_drivers import ReplayEncoder, ReplayImu
 from node.process.drivers.source import SafeEncoder, SafeImu
@@ -29,9 +29,9 @@ class Cycles:
     """A driver and its sensor over cycles."""
 
     def __init__(self, **options: int) -> None:
-        self.chip = EmulatedMpu6500()
+        self.chip = EmulatedMpu()
         self.slept = 0.0
-        self.driver = Mpu6500(self.chip.connect, sleep=self._sleep, **options)
+        self.driver = MpuImu(self.chip.connect, sleep=self._sleep, **options)
         self.driver.start()
         self.now = 100.0
 
@@ -126,21 +126,21 @@ def test_one_frame_at_the_range_marks_the_cycle() -> None:
 
 
 def test_another_chip_and_no_chip_are_refused_by_name() -> None:
-    chip = EmulatedMpu6500(identity=0x71)
+    chip = EmulatedMpu(identity=0x71)
     with pytest.raises(SensorError, match="WHO_AM_I: expected 0x70, got 0x71"):
-        Mpu6500(chip.connect, sleep=lambda _: None).start()
+        MpuImu(chip.connect, sleep=lambda _: None).start()
     chip.absent = True
     with pytest.raises(SensorError, match="No such device"):
-        Mpu6500(chip.connect, sleep=lambda _: None).start()
+        MpuImu(chip.connect, sleep=lambda _: None).start()
     with pytest.raises(SensorError, match="not started"):
-        Mpu6500(chip.connect).read(0.0, 1.0)
+        MpuImu(chip.connect).read(0.0, 1.0)
 
 
 def test_a_register_that_does_not_take_its_value_is_named() -> None:
-    chip = EmulatedMpu6500()
+    chip = EmulatedMpu()
     chip.deaf = {0x1B}
     with pytest.raises(SensorError, match="register 0x1b: expected 0x08, got 0x00"):
-        Mpu6500(chip.connect, sleep=lambda _: None).start()
+        MpuImu(chip.connect, sleep=lambda _: None).start()
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_a_register_that_does_not_take_its_value_is_named() -> None:
 )
 def test_options_out_of_range_are_refused_by_name(option: str, value: int) -> None:
     with pytest.raises(SensorError, match=option):
-        Mpu6500(EmulatedMpu6500().connect, **{option: value})
+        MpuImu(EmulatedMpu().connect, **{option: value})
 
 
 def test_a_fifo_that_overflew_is_a_cycle_lost_and_the_next_one_is_whole() -> None:
@@ -297,12 +297,14 @@ def test_sources_are_chosen_by_name(tmp_path: Path) -> None:
     recording.touch()
     assert isinstance(imu_source(f"replay:{recording}"), ReplayImu)
     assert isinstance(imu_source(f"timed:{recording}"), TimedImu)
-    assert isinstance(imu_source("mpu6500:1"), Mpu6500)
-    assert isinstance(imu_source("mpu6500:1:0x69"), Mpu6500)
+    assert isinstance(imu_source("mpu6500:1"), MpuImu)
+    assert isinstance(imu_source("mpu6500:1:0x69"), MpuImu)
     assert isinstance(encoder_source("counter:/sys/x"), QuadratureFile)
     assert isinstance(encoder_source(f"replay:{recording}"), ReplayEncoder)
     assert isinstance(encoder_source(f"timed:{recording}"), TimedEncoder)
-    for text in ("", "replay:", "mpu6500:", "mpu6500:x", "mpu6500:-1", "mpu6500:1:0x70", "mpu9250:1"):
+    for chip in ("mpu6050", "mpu9250", "icm20948"):
+        assert isinstance(imu_source(f"{chip}:1"), MpuImu)
+    for text in ("", "replay:", "mpu6500:", "mpu6500:x", "mpu6500:-1", "mpu6500:1:0x70", "bmp280:1"):
         with pytest.raises(NodeConfigurationError, match="imu: expected"):
             imu_source(text)
     for text in ("", "counter:", "counter", "file:x"):
@@ -368,10 +370,10 @@ def test_a_node_whose_sensor_goes_away_goes_on_untrusted_and_comes_back(tmp_path
 
 
 def test_a_sensor_absent_at_the_start_is_an_error(tmp_path: Path) -> None:
-    chip = EmulatedMpu6500()
+    chip = EmulatedMpu()
     chip.absent = True
     with pytest.raises(SensorError, match="mpu6500"):
-        TubeProcess(TubeSettings(3), tmp_path, imus=[Mpu6500(chip.connect)])
+        TubeProcess(TubeSettings(3), tmp_path, imus=[MpuImu(chip.connect)])
     with pytest.raises(SensorError, match="absent"):
         EncoderProcess(tmp_path, QuadratureFile(tmp_path / "absent"))
 

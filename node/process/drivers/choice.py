@@ -6,7 +6,8 @@ from pathlib import Path
 
 from node.errors import NodeConfigurationError
 from node.process.drivers.iio_imu import IioImu
-from node.process.drivers.mpu6500 import ADDRESS, Mpu6500, open_bus
+from node.process.drivers.mpu_chips import CHIPS
+from node.process.drivers.mpu_imu import ADDRESS, MpuImu, open_bus
 from node.process.drivers.quadrature import QuadratureFile
 from node.process.drivers.replay_drivers import ReplayEncoder, ReplayImu
 from node.process.drivers.source import EncoderSource, ImuSource
@@ -15,7 +16,9 @@ from node.process.drivers.vn100 import Vn100
 from telemetry.errors import LoggerError
 from telemetry.records.record_reading import RecordReading, read_told
 
-IMU_FORMS = "replay:FILE, timed:FILE, iio:NAME, vn100:DEVICE, mpu6500:BUS or mpu6500:BUS:ADDRESS"
+IMU_FORMS = "replay:FILE, timed:FILE, iio:NAME, vn100:DEVICE, CHIP:BUS or CHIP:BUS:ADDRESS with a chip of " + ", ".join(
+    CHIPS
+)
 COUNTER_FORMS = "replay:FILE, timed:FILE or counter:FILE"
 LARGEST_BUS = 255
 ADDRESSES = (0x68, 0x69)
@@ -38,14 +41,14 @@ def imu_source(text: str) -> ImuSource:
         return IioImu(rest)
     if kind == "vn100" and rest:
         return Vn100(Path(rest))
-    if kind == "mpu6500":
+    if (chip := CHIPS.get(kind)) is not None:
         bus, _, address = rest.partition(":")
         try:
             number, at = int(bus), int(address, 0) if address else ADDRESS
         except ValueError:
             number, at = -1, ADDRESS
         if 0 <= number <= LARGEST_BUS and at in ADDRESSES:
-            return Mpu6500(lambda: open_bus(number), at)
+            return MpuImu(lambda: open_bus(number), at, chip=chip)
     raise NodeConfigurationError(f"imu: expected {IMU_FORMS}, got {text!r}")
 
 

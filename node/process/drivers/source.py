@@ -7,9 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from node.errors import SensorError
+from node.errors import SensorCause, SensorError
 from node.firmware.encoder_node import EncoderSample
 from node.kernels.sensors.correction import USUAL
+from node.process.drivers.gravity_witness import GravityWitness
 from telemetry.messages import Scalar, Severity, Vector3
 
 NOTHING: Vector3 = (math.nan, math.nan, math.nan)
@@ -60,15 +61,16 @@ class EncoderSource(Protocol):
 
 
 class SourceSupervisor:
-    """Keeps a source going: reports its fault and its return once each, and restarts it after every failure."""
+    """Keeps a source going: reports each cause of a fault and its return once, and restarts it after every failure."""
 
     def __init__(self, source: ImuSource | EncoderSource, say: Say, name: str, imu: int = 0) -> None:
         self._source, self._say, self._name = source, say, name
         self._which: dict[str, Scalar] = {"imu": imu} if imu else {}
-        self._failed = self._down = False
+        self._told: set[SensorCause] = set()  # since it failed
+        self._down = False
 
-    def call(self, read: Callable[[], Sample]) -> Sample | None:
-        """What ``read`` gives; None for this cycle when it fails."""
+    def call(self, read: Callable[[], Sample], is_whole: Callable[[Sample], bool] = bool) -> Sample | None:
+        """What ``read`` gives; None for this cycle when it fails. A source is back when it gives what ``is_whole``."""
         try:
             if self._down:  # this cycle is lost: the sensor has not gathered data over all of it
                 self._source.start()
@@ -76,14 +78,20 @@ class SourceSupervisor:
                 return None
             sample = read()
         except SensorError as error:
-            if not self._failed:
-                self._say(Severity.ERROR, f"{self._name}_failed", {"detail": str(error)[:200], **self._which})
-            self._failed = self._down = True
+            self.tell(error)
+            self._down = True
             return None
-        if self._failed:
+        if self._told and is_whole(sample):
             self._say(Severity.WARNING, f"{self._name}_back", self._which)
-        self._failed = False
+            self._told.clear()
         return sample
+
+    def tell(self, error: SensorError) -> None:
+        """Report a fault, unless its cause was told since the source failed."""
+        if error.cause not in self._told:
+            self._told.add(error.cause)
+            details: dict[str, Scalar] = {"cause": str(error.cause), "detail": str(error)[:200]}
+            self._say(Severity.ERROR, f"{self._name}_failed", {**details, **self._which})
 
 
 class SafeImu:
@@ -92,10 +100,21 @@ class SafeImu:
     def __init__(self, source: ImuSource, say: Say, imu: int = 0) -> None:
         self._source = source
         self._alarm = SourceSupervisor(source, say, "sensor", imu)
+        self._gravity = GravityWitness()
 
     def read(self, begin: float, end: float) -> ImuSample:
         """Mean over the cycle, whatever happens."""
-        return self._alarm.call(lambda: self._source.read(begin, end)) or ImuSample(NOTHING, NOTHING)
+
+        def read_proved() -> ImuSample:
+            sample = self._source.read(begin, end)
+            self._gravity.look(sample.rate, sample.force)
+            return sample
+
+        return self._alarm.call(read_proved, _has_numbers) or ImuSample(NOTHING, NOTHING)
+
+
+def _has_numbers(sample: ImuSample) -> bool:
+    return math.isfinite(sample.rate[2])
 
 
 class SafeEncoder:
