@@ -273,3 +273,17 @@ def test_a_reading_that_is_corrected_by_its_temperature_is_lost_without_it() -> 
         ("temperature_lost", True),
         ("temperature_back", None),
     ]
+
+
+@pytest.mark.parametrize("first", range(1, 14))
+def test_bytes_lost_twice_that_make_up_a_frame_are_seen_by_its_temperatures(first: int) -> None:
+    """What is between the two has its words exchanged, and the count is whole."""
+    used = Used()
+    used.outcomes(3)
+    used.chip.live(PERIOD, RATE, FORCE)
+    del used.chip.fifo[200 : 200 + 14 - first]
+    del used.chip.fifo[100 : 100 + first]
+    used.now += PERIOD
+    assert math.isnan(used.safe.read(used.now - PERIOD, used.now).rate[2])
+    assert used.said == [("sensor_failed", "lost_bytes")]
+    assert used.outcomes(3) == ".rr"

@@ -40,7 +40,7 @@ RESET_TIME, WAKE_TIME = 0.1, 0.05  # s
 TRIES: Final = 2  # of one transfer
 WHOLE: Final = 0.9  # of the frames of a cycle, by which a sensor that was started anew has measured all of it
 STANDS: Final = 4  # frames, from which on a count that does not fall by reading is told from a frame that came
-FARTHEST_WARMTH: Final = 10.0  # C between two frames of a cycle; more is no temperature
+FARTHEST_WARMTH: Final = 1.0  # C between two frames of a cycle, ten times their noise; more is another word
 
 
 class Bus(Protocol):
@@ -118,7 +118,7 @@ class MpuImu:
         self.sample_rate = chip.base_rate / (divider + 1)  # Hz
         choice = RangeChoice(RATE_RANGES[rate_range], FORCE_RANGES[force_range], low_pass, divider)
         self._settings, self._delay = chip.all_settings(choice), chip.delays[low_pass]
-        self._blocks = neighbouring(self._settings)
+        self._blocks = neighbouring_registers(self._settings)
         self._frames = FrameClock(self.sample_rate)
         self._rate_lsb = math.radians(rate_range) / 32768.0
         self._force_lsb = force_range * G / 32768.0
@@ -266,7 +266,7 @@ class MpuImu:
         if float(np.ptp(warmth)) > FARTHEST_WARMTH * self._chip.warmth[0]:
             raise SensorError(
                 f"{self._chip.name}: temperatures of the frames of one cycle differ by "
-                f"{float(np.ptp(warmth)) / self._chip.warmth[0]:.0f} C: the borders of the frames are lost",
+                f"{float(np.ptp(warmth)) / self._chip.warmth[0]:.1f} C: the borders of the frames are lost",
                 SensorCause.LOST_BYTES,
             )
         return words
@@ -339,7 +339,7 @@ class MpuImu:
         raise SensorError(f"{self._chip.name}: register 0x{register:02x}: no answer", SensorCause.BUS)
 
 
-def neighbouring(settings: Settings) -> tuple[tuple[int, tuple[int, ...]], ...]:
+def neighbouring_registers(settings: Settings) -> tuple[tuple[int, tuple[int, ...]], ...]:
     """Settings as blocks of registers that follow on each other: the first of each, and their values."""
     blocks: list[tuple[int, list[int]]] = []
     for register, value in sorted(settings):
