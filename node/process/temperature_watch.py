@@ -1,4 +1,4 @@
-"""Temperatures that cannot be: told, and no correction by them.
+"""Impossible temperatures: told, and no correction by them.
 
 A reading whose correction follows the temperature means nothing without it and is left out, so that the filter's
 variance grows; another is as good as before, and keeps the last temperature that was one.

@@ -231,7 +231,7 @@ class Events(TubeProcess):
 
 @pytest.mark.parametrize("temperature", [math.nan, math.inf, -1e9, 400.0])
 @pytest.mark.parametrize("is_own", [True, False])
-def test_a_temperature_that_is_none_is_told_and_the_readings_stay(
+def test_an_impossible_temperature_is_told_and_the_readings_stay(
     tmp_path: Path, temperature: float, is_own: bool
 ) -> None:
     chip = EmulatedMpu()
