@@ -19,7 +19,10 @@ from telemetry.runtime.process_options import (
 from telemetry.runtime.typed_options import gather_options
 
 encoder_options = gather_options(
-    click.option("--counter", help="The encoder's own counter: counter:FILE, replay:FILE or timed:FILE."),
+    click.option(
+        "--counter",
+        help="The encoder's own counter: counter:/dev/counter0, gpio:chip0:A,B, counter:FILE, replay:FILE, timed:FILE.",
+    ),
     click.option(
         "--torque-nm",
         type=float,
@@ -57,7 +60,7 @@ def encoder(
     Examples:
       borechain encoder --folder state/encoder
       borechain encoder --clock own --counter replay:counter.csv --above base --below 2
-      borechain encoder --clock own --counter counter:/dev/encoder --above base --lower can:can0
+      borechain encoder --clock own --counter counter:/dev/counter0 --above base --lower can:can0
     """
     from node.firmware.torque import TorqueSettings
     from node.process.drivers.choice import encoder_source

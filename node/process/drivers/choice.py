@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from node.errors import NodeConfigurationError
+from node.process.drivers.gpio_encoder import GpioEncoder
+from node.process.drivers.gpio_lines import ChipLines
 from node.process.drivers.iio_imu import IioImu
 from node.process.drivers.mpu_chips import CHIPS
 from node.process.drivers.mpu_imu import ADDRESS, MpuImu, open_bus
-from node.process.drivers.quadrature import QuadratureFile
+from node.process.drivers.quadrature import QuadratureFile, counter_file
 from node.process.drivers.replay_drivers import ReplayEncoder, ReplayImu
 from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.drivers.timed import TimedEncoder, TimedImu
@@ -19,7 +22,8 @@ from telemetry.records.record_reading import RecordReading, read_told
 IMU_FORMS = "replay:FILE, timed:FILE, iio:NAME, vn100:DEVICE, CHIP:BUS or CHIP:BUS:ADDRESS with a chip of " + ", ".join(
     CHIPS
 )
-COUNTER_FORMS = "replay:FILE, timed:FILE or counter:FILE"
+COUNTER_FORMS = "replay:FILE, timed:FILE, counter:/dev/counterN, counter:FILE or gpio:CHIP:A,B or gpio:CHIP:A,B,INDEX"
+LINES = re.compile(r"((?:/dev/)?(?:gpio)?chip\d+):(\d{1,3},\d{1,3}(?:,\d{1,3})?)")
 LARGEST_BUS = 255
 ADDRESSES = (0x68, 0x69)
 
@@ -66,7 +70,12 @@ def encoder_source(text: str) -> EncoderSource:
     if kind == "timed" and rest:
         return TimedEncoder(recording_path("counter", rest))
     if kind == "counter" and rest:
-        return QuadratureFile(Path(rest))
+        return QuadratureFile(counter_file(rest))
+    if kind == "gpio" and (found := LINES.fullmatch(rest)):
+        chip = Path("/dev") / found[1].replace("/dev/", "").replace("gpiochip", "chip").replace("chip", "gpiochip")
+        lines = [int(number) for number in found[2].split(",")]
+        if len(set(lines)) == len(lines):
+            return GpioEncoder(lambda: ChipLines(chip, lines), lines)
     raise NodeConfigurationError(f"counter: expected {COUNTER_FORMS}, got {text!r}")
 
 
