@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import queue
 import sys
 import warnings
 from collections.abc import Callable
@@ -99,15 +98,6 @@ def guard_of(endpoint: str, place: Path | None) -> tuple[Credentials | None, dic
     """What a router shows over TLS and whom it lets do what; nothing of both without TLS."""
     credentials = credentials_for(endpoint, place, ROUTER)
     return credentials, None if credentials is None else read_access(credentials.authority.parent)
-
-
-def run_router(endpoint: str, keys_place: Path | None = None) -> None:
-    """Be the router that the processes of a rig meet at, until a signal comes."""
-    stopped: queue.SimpleQueue[None] = queue.SimpleQueue()
-    begin_process("router")
-    with opened_router(endpoint, keys_place):
-        on_termination(lambda: stopped.put(None))
-        stopped.get()
 
 
 def opened_router(endpoint: str, keys_place: Path | None = None) -> AbstractContextManager[ZenohBus]:
