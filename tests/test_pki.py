@@ -302,7 +302,7 @@ def test_a_folder_from_before_there_were_persons_is_read_and_its_roles_can_be_re
 
 @pytest.mark.parametrize(
     ("days", "said"),
-    [(0, ""), (152, ""), (154, "ends in 28 days"), (182, "ends in 0 days"), (184, "has ended"), (-2, "in the future")],
+    [(0, ""), (152, ""), (154, "ends in 29 days"), (182, "ends in 1 days"), (184, "has ended"), (-2, "in the future")],
 )
 def test_a_certificate_is_told_of_a_month_before_its_end_and_of_tomorrow(folder: Path, days: int, said: str) -> None:
     trouble = certificate_trouble(folder / "driller.pem", NOW + datetime.timedelta(days=days))

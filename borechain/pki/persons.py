@@ -38,7 +38,7 @@ class Person:
 FIRST = (Person(OPERATOR, OPERATOR), Person(DRILLER, DRILLER))  # whose certificates a new rig has
 
 
-def admitted(persons: Iterable[Person]) -> dict[str, str]:
+def admitted_roles(persons: Iterable[Person]) -> dict[str, str]:
     """Role of each common name that the router lets in."""
     return {person.common_name: person.role for person in persons if not person.is_revoked}
 
@@ -74,7 +74,7 @@ def without_person(persons: tuple[Person, ...], name: str) -> tuple[Person, ...]
     Raises
     ------
     KeyFileError
-        When nobody of that name has a certificate.
+        When no person of that name has a certificate.
     """
     names = sorted(person.name for person in persons if not person.is_revoked)
     if name not in names:

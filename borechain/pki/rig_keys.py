@@ -16,7 +16,7 @@ from typing import Any
 
 from borechain.pki.access import MEDIUM, ROUTER, write_access
 from borechain.pki.certificates import AT_THE_SURFACE, OF_A_PERSON, VALID, make_authority, make_certificate
-from borechain.pki.persons import FIRST, Person, admitted, person_lines, person_of, with_person, without_person
+from borechain.pki.persons import FIRST, Person, admitted_roles, person_lines, person_of, with_person, without_person
 from borechain.pki.private_files import write_private
 from telemetry.errors import KeyFileError
 from telemetry.media.credentials import DEPTH_SOURCE, file_name
@@ -156,7 +156,7 @@ def revoke_person(folder: Path, name: str) -> RigSecret:
     Raises
     ------
     KeyFileError
-        When the folder holds no rig's keys, or nobody has this name.
+        When the folder holds no rig's keys, or no person has this name.
     """
     secret = read_secret(folder)
     shut = replace(secret, persons=without_person(secret.persons, name))
@@ -172,7 +172,7 @@ def renew_certificate(folder: Path, name: str, now: datetime.datetime) -> Path:
     Raises
     ------
     KeyFileError
-        When the folder holds no rig's keys, or nobody of this name has a certificate.
+        When the folder holds no rig's keys, or none of this name has a certificate.
     """
     secret = read_secret(folder)
     person = next((one for one in secret.persons if one.name == name and not one.is_revoked), None)
@@ -256,7 +256,7 @@ def _write(folder: Path, secret: RigSecret, addresses: Iterable[int]) -> None:
     """Write the secret last: until then the earlier files can be made again."""
     for address in addresses:
         write_private(_file_of(folder, address), pack_ring(secret.ring(address)))
-    write_access(folder, secret.rig, admitted(secret.persons), secret.revoked)
+    write_access(folder, secret.rig, admitted_roles(secret.persons), secret.revoked)
     write_private(folder / SECRET_FILE, _pack_secret(secret))
 
 

@@ -21,13 +21,13 @@ def certificate_trouble(path: Path, now: datetime.datetime) -> str:
     if now < begin:
         return f"{path}: good from {begin:%Y-%m-%d %H:%M} UTC, which is in the future; expected a clock that is set"
     if now >= end:
-        return f"{path}: has ended, on {end:%Y-%m-%d %H:%M} UTC; {remedy(path)}"
+        return f"{path}: has ended, on {end:%Y-%m-%d %H:%M} UTC; {renewal_advice(path)}"
     if now >= end - WARNED:
-        return f"{path}: ends in {(end - now).days} days, on {end:%Y-%m-%d %H:%M} UTC; {remedy(path)}"
+        return f"{path}: ends in {(end - now).days} days, on {end:%Y-%m-%d %H:%M} UTC; {renewal_advice(path)}"
     return ""
 
 
-def remedy(path: Path) -> str:
+def renewal_advice(path: Path) -> str:
     """How a certificate is made anew."""
     return f"borechain pki renew {path.stem} makes it anew, and the rig drills on"
 

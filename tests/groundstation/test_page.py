@@ -261,7 +261,7 @@ def unread(port: int) -> socket.socket:
 
 
 def test_who_is_signed_in_is_answered_however_many_stand_in_the_door(served: tuple[Served, int]) -> None:
-    """Half-open connections, streams that nobody reads and wrong passwords, all of the crew's own address."""
+    """Half-open connections, unread streams and wrong passwords, all of the crew's own address."""
     crew, counters = PageClient(served[1]), served[0].rig.ground.endpoint.counters
     deadline = time.monotonic() + PATIENCE
     while crew.sign_in().status != 200:

@@ -1,6 +1,7 @@
 """Who comes in at the page: passwords and sessions, ports and addresses, and what a network asks of them."""
 
 import contextlib
+import datetime
 import re
 import socket
 import ssl
@@ -121,7 +122,7 @@ def test_over_a_network_reading_needs_a_session_too(tmp_path: Path, passwords: d
 
 
 def test_over_https_the_cookie_goes_nowhere_else(tmp_path: Path, passwords: dict[str, str]) -> None:
-    stick, port = make_folder(tmp_path / "stick"), free_port()
+    stick, port = make_folder(tmp_path / "stick", now=datetime.datetime.now(datetime.UTC)), free_port()
     certificate, key = stick / "router.pem", stick / "router.key"
     check_certificate(certificate, key)
     with pytest.raises(ConfigurationError, match="page-tls: expected a certificate and its key"):
@@ -219,7 +220,7 @@ def test_one_more_connection_finds_a_place_and_nobody_who_is_signed_in_gives_way
         gone = those_to_end(there, fresh, signed)  # type: ignore[arg-type, type-var]
         assert fresh not in gone
         assert not any(one.client in signed for one in gone)
-        for one in gone:  # whoever stays at its address has a request, or came later
+        for one in gone:  # one that stays at its address has a request, or came later
             assert all(
                 (one.is_busy, one.opened) < (other.is_busy, other.opened)
                 for other in there

@@ -203,7 +203,7 @@ class PageHandlers:
             if hold := self._wrong.hold_of(address, time.monotonic(), who):
                 raise RequestError(429, f"too soon after a wrong password; wait {math.ceil(hold)} s", retry_after=hold)
             if await request.is_disconnected():
-                raise RequestError(408, "nobody waits for the answer any more")
+                raise RequestError(408, "the connection ended before the answer")
             known = self._passwords.current()
             holder = find_holder(known, role, name)
             hashed = known[holder] if holder is not None else next(iter(known.values()), NEVER)  # takes as long

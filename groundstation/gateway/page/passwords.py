@@ -63,7 +63,7 @@ def holder_of(role: str, name: str = "") -> str:
 
 
 def roles_of(passwords: Mapping[str, str]) -> list[str]:
-    """Roles that somebody has a password for."""
+    """Roles that have a password, or of whose persons one has."""
     return sorted({holder.partition("/")[0] for holder in passwords})
 
 
@@ -77,7 +77,7 @@ def find_holder(passwords: Mapping[str, str], role: str, name: str) -> str | Non
 
 
 class PasswordBook:
-    """Passwords as they are now: a file that was changed is read again, one that cannot be read lets nobody in.
+    """Passwords as they are now: a file that was changed is read again, with one that cannot be read there are none.
 
     Parameters
     ----------
