@@ -19,7 +19,7 @@ from telemetry import keys
 from telemetry.media.credentials import Credentials, credentials_for
 from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
 from telemetry.media.zenoh_port import CONNECT_TIMEOUT
-from telemetry.runtime.hosting import Place, begin_process, on_termination, reporting_errors
+from telemetry.runtime.hosting import Place, begin_process, on_termination, reporting_errors, write_warning
 
 SAY_EVERY = 10.0  # wall s, of who is waited for
 
@@ -72,7 +72,10 @@ def run_medium(
             scheduler = Scheduler(world, stepper, tell, speed, cued=cued, seal_depth=seal_depth, absent=absent)
             on_termination(scheduler.stop)
             with contextlib.closing(stepper):
-                if scheduler.run():
+                is_whole = scheduler.run()
+                if stepper.foreign:
+                    write_warning("medium", f"{stepper.foreign} frames that no process of the rig sent were dropped")
+                if is_whole:
                     scheduler.linger()
 
 

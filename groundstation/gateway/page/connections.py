@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from itertools import count
 
 from starlette.datastructures import Address
-from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 
 CONNECTIONS = 200  # at a time
 OF_ONE_ADDRESS = 64  # of these, without a session
@@ -66,7 +66,8 @@ class BoundedProtocol(H11Protocol):
     @property
     def is_busy(self) -> bool:
         """Whether a request is under way."""
-        return self.cycle is not None and not self.cycle.response_complete
+        cycle: RequestResponseCycle | None = self.cycle  # none before the first request
+        return cycle is not None and not cycle.response_complete
 
 
 def those_to_end(
