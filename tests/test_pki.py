@@ -18,9 +18,9 @@ from borechain.pki.rig_keys import add_tube, init_rig, read_secret, revoke_tube,
 from groundstation.gateway.page.passwords import is_right, read_passwords
 from telemetry.application.seals import Keys, seals_of
 from telemetry.errors import KeyFileError
-from telemetry.media.certificate_dates import certificate_trouble
 from telemetry.media.credentials import DEPTH_SOURCE, credentials_for, credentials_of, file_name, needs_tls
 from telemetry.messages import BASE, ENCODER, Side
+from telemetry.transport.certificate_dates import certificate_trouble
 from telemetry.transport.key_ring import key_file, read_ring
 
 SECRETS = (".keys", ".key", ".secret")

@@ -44,7 +44,7 @@ class StepAssembler:
     def __init__(self) -> None:
         self._steps: deque[bytes] = deque()
         self._junk = 0
-        self._frames = {channel: MarkedFrames() for channel in CHANNELS}
+        self._frames: dict[int, MarkedFrames] = {channel: MarkedFrames() for channel in CHANNELS}
         self._step: tuple[int, list[DueEvent]] | None = None
 
     @property

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from groundstation.service.alarms.rig_alarms import RigAlarms
-from telemetry.media.certificate_dates import certificate_troubles
+from telemetry.transport.certificate_dates import certificate_troubles
 
 LOOK_EVERY = 10.0  # s
 CODE = "certificate"
