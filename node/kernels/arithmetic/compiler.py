@@ -165,11 +165,11 @@ class _Compilations(event.Listener):
 def telling_compiled(began: Callable[[], object], ended: Callable[[], object]) -> Iterator[None]:
     """Have ``began`` and ``ended`` called around every function that is compiled meanwhile, those within others too."""
     listener = _Compilations(began, ended)
-    event.register("numba:compile", listener)
+    event.register("numba:compile", listener)  # type: ignore[no-untyped-call]
     try:
         yield
     finally:
-        event.unregister("numba:compile", listener)
+        event.unregister("numba:compile", listener)  # type: ignore[no-untyped-call]
 
 
 def leave_blas_out() -> None:
