@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from node.kernels.arithmetic.formats import ANGLE_Q, VECTOR_Q
-from node.kernels.arithmetic.integers import multiply_q31, quotient_q30, root_of, rounded_shift
+from node.kernels.arithmetic.integers import bit_length, multiply_q31, quotient_q30, root_of, rounded_shift
 from node.kernels.arithmetic.jit import kernel
 from node.kernels.arithmetic.trigonometry import exponential_decay, radians_to_counts, sine_cosine
 
@@ -28,7 +28,9 @@ LOGS: Final = np.array(
 NOTHING: Final = 32 << 32  # of a sum of them: the law is 0 in 31 bits
 LARGEST: Final = 1 << (LEVEL_Q + 20)  # ratio of radius and noise
 HALF_STEP_SQUARED: Final = round(STEP * STEP / 4.0 * 2.0**31)
-MOST_TAKEN: Final = 128  # of the samples: of more, each stands for several, and a chip is done within its cycle
+MOST_TAKEN: Final = (
+    128  # samples at a low ratio; at a high one only those near the extreme count. Of more each stands for several
+)
 NEVER_BELOW: Final = 1 << 4  # rad, Q40, of a noise: as 1e-12 rad for floats, and a ratio still fits
 ONE: Final = 1 << VECTOR_Q
 
@@ -36,7 +38,7 @@ ONE: Final = 1 << VECTOR_Q
 @kernel
 def nonexceedance_probability(z: int, ratio: int, samples: int, phase: int) -> int:
     """How probable it is (Q31) that no sample is above the radius by ``z`` sigmas (Q24)."""
-    taken = min(samples, MOST_TAKEN)
+    taken = min(samples, MOST_TAKEN << (max(bit_length(ratio >> LEVEL_Q) - 4, 0) >> 1))
     before = taken >> 1
     total = logs_outward(z, ratio, taken, phase, 0, taken - before, 1)
     if total <= NOTHING:
