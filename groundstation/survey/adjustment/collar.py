@@ -16,6 +16,7 @@ from groundstation.survey.adjustment.equations import KNOWN, STATE, leg_steps
 from groundstation.survey.adjustment.looks import PathPrior
 from groundstation.survey.adjustment.scores import best_sizes
 from groundstation.survey.adjustment.sphere import bends_between
+from groundstation.survey.path.leg_wander import UNTIED, CollarTie
 
 Array = npt.NDArray[np.float64]
 WIDE_COLLAR = 0.5  # rad, of a collar that was told wrong, before the stations tell it
@@ -59,6 +60,17 @@ def collar_departure(found: Adjusted) -> CollarDeparture:
     free = down.T @ weight @ own @ down
     sizes, _, told, squares = best_sizes(-(down.T @ weight @ pulled)[None], free[None], free[None])
     return CollarDeparture(sizes[0], np.asarray(np.linalg.pinv(free), np.float64), float(squares[0]), int(told[0]))
+
+
+def collar_tie(found: Adjusted) -> CollarTie:
+    """How the direction at the collar of an adjustment goes with the curvature of its first leg."""
+    if len(found.path.md) < 2:
+        return UNTIED
+    one = np.zeros((len(found.path.md), 2, 2))
+    one[0] = np.eye(2)
+    states, _ = found.cofactor(one, np.zeros((len(found.common_cov), 2)))
+    departs = states[1] - leg_steps(found.path)[0][0] @ states[0]
+    return CollarTie(*(0.5 * float(np.trace(part)) for part in (states[0, 2:], departs[:2], departs[2:])))
 
 
 def led_down(go: Array, told: Array, curvature_var: float) -> Array:
