@@ -138,7 +138,7 @@ tube_options = gather_options(
         "--imu",
         "sources",
         multiple=True,
-        help="The node's own IMU: replay:FILE, timed:FILE, iio:NAME, vn100:DEVICE, mpu6500:BUS or mpu6500:BUS:ADDRESS "
+        help="The node's own IMU: replay:FILE, timed:FILE, iio:NAME, vn100:DEVICE, mpu6500:BUS or mpu6500:BUS:ADDRESS. "
         "Repeat for several.",
     ),
     click.option(
