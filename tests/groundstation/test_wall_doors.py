@@ -1,7 +1,7 @@
 """One wall through both doors: as a file, and with one of its holes coming live. Nothing that is said may differ."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -142,6 +142,33 @@ def test_a_wall_of_the_same_columns_is_the_same_to_the_last_digit(tmp_path: Path
     assert live.extras == by_file.extras
 
 
+@pytest.mark.parametrize("with_covs", [True, False])
+@pytest.mark.parametrize("door", ["file", "live"])
+def test_surveys_may_count_from_another_north_than_the_wall(tmp_path: Path, door: str, with_covs: bool) -> None:
+    """Grid north lies 7 deg west of true north, from which the stations count: the wall is the one of grid north."""
+    case, west = CASES["raked"], math.radians(7.0)
+    holes = {name: surveyed(case, name, 2.0 if name == case.own else 0.0) for name in case.heads}
+    to_true = np.array([[math.cos(west), math.sin(west), 0.0], [-math.sin(west), math.cos(west), 0.0], [0.0, 0.0, 1.0]])
+    from_true = {
+        name: replace(hole, azimuth=hole.azimuth - west, covs=to_true @ hole.covs @ to_true.T)
+        for name, hole in holes.items()
+        if hole.covs is not None
+    }
+    told = 'north = "grid"\nstations_north = "true"\nconvergence_deg = -7\n'
+    for folder in ("grid", "true"):
+        (tmp_path / folder).mkdir()
+    expected = judge_wall(read_wall(written(tmp_path / "grid", case, holes, with_covs)))
+    own = replace(from_true[case.own], covs=from_true[case.own].covs if with_covs else None)
+    others = from_true if door == "file" else {name: hole for name, hole in from_true.items() if name != case.own}
+    path = written(tmp_path / "true", replace(case, keys=told), others, with_covs)
+    found = judge_wall(read_wall(path)) if door == "file" else LiveWall(path, case.own).judged(own, LENGTH).judgement
+    assert found is not None
+    np.testing.assert_allclose(np.sort(found.joints.thickness, 0), np.sort(expected.joints.thickness, 0), atol=1e-9)
+    np.testing.assert_allclose(
+        np.sort(found.joints.probability, 0), np.sort(expected.joints.probability, 0), rtol=1e-6, atol=1e-15
+    )
+
+
 def test_a_void_beside_the_hole_is_seen_live(tmp_path: Path) -> None:
     _, by_file, _, live = both_doors(tmp_path, CASES["grid"], 6.0, with_covs=True)
     assert by_file.voids
@@ -190,7 +217,7 @@ def raked(inclination_deg: float) -> dict[str, float]:
     return {"design_inclination_deg": inclination_deg, "collar_inclination_deg": inclination_deg}
 
 
-@pytest.mark.parametrize("rake_deg", [0.0, 15.0, 60.0])
+@pytest.mark.parametrize("rake_deg", [0.0, 15.0, 60.0, 89.5, 90.0, 110.0])
 def test_a_hole_drilled_on_its_design_stands_on_it_in_the_wall(tmp_path: Path, rake_deg: float) -> None:
     case = Case(LINE, "H2", inclination_deg=rake_deg)
     others = {name: surveyed(case, name, 0.0) for name in ("H1", "H3")}
