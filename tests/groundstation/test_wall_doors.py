@@ -15,7 +15,7 @@ from groundstation.survey.wall.column_plans import ColumnSurvey
 from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.judged_wall import judge_wall
 from groundstation.survey.wall.wall_file import Wall, read_wall
-from groundstation.survey.wall.wall_verdict import Judgement
+from groundstation.survey.wall.wall_verdict import Judgement, WallVerdict
 
 SPACING, LENGTH, STEP = 0.75, 8.0, 2.0
 COVARIANCE = ("cov_nn_m2", "cov_ne_m2", "cov_nd_m2", "cov_ee_m2", "cov_ed_m2", "cov_dd_m2")
@@ -169,6 +169,29 @@ def test_surveys_may_count_from_another_north_than_the_wall(tmp_path: Path, door
     )
 
 
+def test_a_remedial_column_closes_the_joint_that_it_stands_in_for_live_too(tmp_path: Path) -> None:
+    """Two of three columns stand 1.1 m apart, and one between them is drilled last."""
+    case = Case({"A": (0.0, 0.0, 0.0), "B": (0.0, 1.1, 0.0), "C": (0.0, 1.8, 0.0), "R": (0.05, 0.55, 0.0)}, "R")
+    holes = {name: surveyed(case, name, 0.0) for name in case.heads}
+    own = holes["R"]
+    file = written(tmp_path, case, holes, with_covs=True)
+    heads = (tmp_path / "heads.csv").read_text().splitlines()
+    remedied = "\n".join([f"{heads[0]},between", *(f"{row}," for row in heads[1:4]), f"{heads[4]},A/B"]) + "\n"
+    (tmp_path / "heads.csv").write_text(remedied)
+    by_file = judge_wall(read_wall(file))
+    written(tmp_path, case, {name: holes[name] for name in "ABC"}, with_covs=True)
+    (tmp_path / "heads.csv").write_text(remedied)
+    live = LiveWall(file, "R")
+    found = live.judged(own, LENGTH).judgement
+    assert found is not None
+    assert found.verdict == by_file.verdict == WallVerdict.TIGHT
+    np.testing.assert_allclose(found.joints.probability, by_file.joints.probability[:1], rtol=1e-9)
+    np.testing.assert_allclose(found.joints.thickness, by_file.joints.thickness[:1], atol=1e-12)
+    before = LiveWall(file, "R").judged(ColumnSurvey(*np.zeros((3, 1))), None).judgement
+    assert before is not None
+    assert before.verdict is WallVerdict.NOT_TIGHT
+
+
 def test_a_void_beside_the_hole_is_seen_live(tmp_path: Path) -> None:
     _, by_file, _, live = both_doors(tmp_path, CASES["grid"], 6.0, with_covs=True)
     assert by_file.voids
@@ -235,6 +258,11 @@ def test_a_hole_drilled_on_its_design_stands_on_it_in_the_wall(tmp_path: Path, r
     sigma = np.sqrt(np.maximum(np.diagonal(columns.covs[found.own], axis1=1, axis2=2), 0.0))
     assert np.all(np.isfinite(off))
     assert np.all(np.abs(off) <= sigma + 1e-9)
+    rows = rig.ask("stations")["stations"]  # what is told of the hole itself is what its wall takes
+    told = [[row[f"sigma_{name}_m"] for name in ("north", "east", "tvd")] for row in rows]
+    taken = survey_of(model).covs
+    assert taken is not None
+    np.testing.assert_allclose(np.sqrt(np.diagonal(taken[1:], axis1=1, axis2=2)), told, rtol=1e-3, atol=1e-6)
     rig.ground.close()
 
 
