@@ -58,7 +58,7 @@ def _record(wall: Wall, judgement: Judgement, k: int) -> ColumnRecord:
         told = hole.covs
         covs = position_covariance(survey_errors(survey, plan.tool, wall.file.assumed)) if told is None else told
     covs = covs + plan.head_std**2 * np.diag([1.0, 1.0, 0.0])
-    actions = [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings if name in f.what.split("-")]
+    actions = [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings if f.is_about(name)]
     actions += remedy_lines(wall, judgement, k)
     return ColumnRecord(
         plan.design, state_words(plan, built, k), plan.tool, plan.serial, plan.calibration, plan.head_std, hole.md,
