@@ -1,7 +1,7 @@
 """One wall through both doors: as a file, and with one of its holes coming live. Nothing that is said may differ."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from groundstation.survey.wall.column_plans import ColumnSurvey
 from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.judged_wall import judge_wall
 from groundstation.survey.wall.wall_file import Wall, read_wall
-from groundstation.survey.wall.wall_verdict import Judgement
+from groundstation.survey.wall.wall_verdict import Judgement, WallVerdict
 
 SPACING, LENGTH, STEP = 0.75, 8.0, 2.0
 COVARIANCE = ("cov_nn_m2", "cov_ne_m2", "cov_nd_m2", "cov_ee_m2", "cov_ed_m2", "cov_dd_m2")
@@ -142,6 +142,56 @@ def test_a_wall_of_the_same_columns_is_the_same_to_the_last_digit(tmp_path: Path
     assert live.extras == by_file.extras
 
 
+@pytest.mark.parametrize("with_covs", [True, False])
+@pytest.mark.parametrize("door", ["file", "live"])
+def test_surveys_may_count_from_another_north_than_the_wall(tmp_path: Path, door: str, with_covs: bool) -> None:
+    """Grid north lies 7 deg west of true north, from which the stations count: the wall is the one of grid north."""
+    case, west = CASES["raked"], math.radians(7.0)
+    holes = {name: surveyed(case, name, 2.0 if name == case.own else 0.0) for name in case.heads}
+    to_true = np.array([[math.cos(west), math.sin(west), 0.0], [-math.sin(west), math.cos(west), 0.0], [0.0, 0.0, 1.0]])
+    from_true = {
+        name: replace(hole, azimuth=hole.azimuth - west, covs=to_true @ hole.covs @ to_true.T)
+        for name, hole in holes.items()
+        if hole.covs is not None
+    }
+    told = 'north = "grid"\nstations_north = "true"\nconvergence_deg = -7\n'
+    for folder in ("grid", "true"):
+        (tmp_path / folder).mkdir()
+    expected = judge_wall(read_wall(written(tmp_path / "grid", case, holes, with_covs)))
+    own = replace(from_true[case.own], covs=from_true[case.own].covs if with_covs else None)
+    others = from_true if door == "file" else {name: hole for name, hole in from_true.items() if name != case.own}
+    path = written(tmp_path / "true", replace(case, keys=told), others, with_covs)
+    found = judge_wall(read_wall(path)) if door == "file" else LiveWall(path, case.own).judged(own, LENGTH).judgement
+    assert found is not None
+    np.testing.assert_allclose(np.sort(found.joints.thickness, 0), np.sort(expected.joints.thickness, 0), atol=1e-9)
+    np.testing.assert_allclose(
+        np.sort(found.joints.probability, 0), np.sort(expected.joints.probability, 0), rtol=1e-6, atol=1e-15
+    )
+
+
+def test_a_remedial_column_closes_the_joint_that_it_stands_in_for_live_too(tmp_path: Path) -> None:
+    """Two of three columns stand 1.1 m apart, and one between them is drilled last."""
+    case = Case({"A": (0.0, 0.0, 0.0), "B": (0.0, 1.1, 0.0), "C": (0.0, 1.8, 0.0), "R": (0.05, 0.55, 0.0)}, "R")
+    holes = {name: surveyed(case, name, 0.0) for name in case.heads}
+    own = holes["R"]
+    file = written(tmp_path, case, holes, with_covs=True)
+    heads = (tmp_path / "heads.csv").read_text().splitlines()
+    remedied = "\n".join([f"{heads[0]},between", *(f"{row}," for row in heads[1:4]), f"{heads[4]},A/B"]) + "\n"
+    (tmp_path / "heads.csv").write_text(remedied)
+    by_file = judge_wall(read_wall(file))
+    written(tmp_path, case, {name: holes[name] for name in "ABC"}, with_covs=True)
+    (tmp_path / "heads.csv").write_text(remedied)
+    live = LiveWall(file, "R")
+    found = live.judged(own, LENGTH).judgement
+    assert found is not None
+    assert found.verdict == by_file.verdict == WallVerdict.TIGHT
+    np.testing.assert_allclose(found.joints.probability, by_file.joints.probability[:1], rtol=1e-9)
+    np.testing.assert_allclose(found.joints.thickness, by_file.joints.thickness[:1], atol=1e-12)
+    before = LiveWall(file, "R").judged(ColumnSurvey(*np.zeros((3, 1))), None).judgement
+    assert before is not None
+    assert before.verdict is WallVerdict.NOT_TIGHT
+
+
 def test_a_void_beside_the_hole_is_seen_live(tmp_path: Path) -> None:
     _, by_file, _, live = both_doors(tmp_path, CASES["grid"], 6.0, with_covs=True)
     assert by_file.voids
@@ -190,7 +240,7 @@ def raked(inclination_deg: float) -> dict[str, float]:
     return {"design_inclination_deg": inclination_deg, "collar_inclination_deg": inclination_deg}
 
 
-@pytest.mark.parametrize("rake_deg", [0.0, 15.0, 60.0])
+@pytest.mark.parametrize("rake_deg", [0.0, 15.0, 60.0, 89.5, 90.0, 110.0])
 def test_a_hole_drilled_on_its_design_stands_on_it_in_the_wall(tmp_path: Path, rake_deg: float) -> None:
     case = Case(LINE, "H2", inclination_deg=rake_deg)
     others = {name: surveyed(case, name, 0.0) for name in ("H1", "H3")}
@@ -208,6 +258,11 @@ def test_a_hole_drilled_on_its_design_stands_on_it_in_the_wall(tmp_path: Path, r
     sigma = np.sqrt(np.maximum(np.diagonal(columns.covs[found.own], axis1=1, axis2=2), 0.0))
     assert np.all(np.isfinite(off))
     assert np.all(np.abs(off) <= sigma + 1e-9)
+    rows = rig.ask("stations")["stations"]  # what is told of the hole itself is what its wall takes
+    told = [[row[f"sigma_{name}_m"] for name in ("north", "east", "tvd")] for row in rows]
+    taken = survey_of(model).covs
+    assert taken is not None
+    np.testing.assert_allclose(np.sqrt(np.diagonal(taken[1:], axis1=1, axis2=2)), told, rtol=1e-3, atol=1e-6)
     rig.ground.close()
 
 

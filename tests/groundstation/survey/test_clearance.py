@@ -221,6 +221,45 @@ def straight(
     return ClearanceHole(WellSurvey(md, i, a, places[:, 2]), places, (Leg(tool),), 0.5, serial)
 
 
+def test_holes_that_meet_err_across_both_of_them() -> None:
+    """Both lean by 30 deg, to the north and to the east; an azimuth moves each level, across its own way.
+
+    Where they meet nothing tells a direction but their common normal.
+    """
+    lean, meets = 30.0 * DEG, 50.0
+    one, two = straight(0.0, steep=lean), straight(0.0, azimuth=0.5 * math.pi, steep=lean)
+    ways = [np.array([0.5, 0.0, math.cos(lean)]), np.array([0.0, 0.5, math.cos(lean)])]
+    two = replace(two, positions=two.positions + meets * (ways[0] - ways[1]))
+    found = clearance_between(one, two, SITE).nearest
+    assert float(found.distance[0]) < 1e-9
+    normal = np.cross(*ways)
+    normal /= np.linalg.norm(normal)
+    moved = 1.0 * DEG * math.sin(lean) * (meets - 5.0)  # the first direction is known, half a leg of 10 m
+    assert float(found.sigma[0]) == pytest.approx(moved * math.hypot(normal[0], normal[1]), rel=1e-3)
+
+
+@pytest.mark.parametrize("nearer", [0, 1])
+def test_the_nearer_of_two_passes_by_one_long_leg_is_found(nearer: int) -> None:
+    """A hairpin crosses a level leg of 100 m twice, 8 m apart; samples an eighth of the leg apart see one pass."""
+    md = np.array([0.0, 100.0])
+    level = WellSurvey(md, np.full(2, 0.5 * math.pi), np.full(2, 0.5 * math.pi), np.zeros(2))
+    reference = ClearanceHole(level, np.array([[0.0, 0.0, 0.0], [0.0, 100.0, 0.0]]), (Leg(load_tool("relay")),), 0.01)
+    asides = (0.5, 0.8) if nearer == 0 else (0.8, 0.5)
+    turn = np.linspace(0.0, math.pi, 25)
+    down, up = np.arange(-20.0, 10.0, 0.5), np.arange(9.5, -20.0, -0.5)
+    east = np.concatenate([np.full(len(down), 45.5), 49.5 - 4.0 * np.cos(turn), np.full(len(up), 53.5)])
+    depth = np.concatenate([down, 10.0 + 4.0 * np.sin(turn), up])
+    tilt = (east - 45.5) / 8.0
+    places = np.stack([asides[0] + (asides[1] - asides[0]) * tilt, east, depth], axis=1)
+    ways = np.gradient(places, axis=0)
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
+    hairpin = WellSurvey(lengths, np.arccos(ways[:, 2]), np.arctan2(ways[:, 1], ways[:, 0]), depth)
+    found = clearance_between(reference, ClearanceHole(hairpin, places, (Leg(load_tool("relay")),), 0.01), SITE)
+    assert float(found.nearest.distance[0]) == pytest.approx(0.5, abs=1e-3)
+    assert float(found.nearest.md[0]) == pytest.approx((45.5, 53.5)[nearer], abs=0.05)
+
+
 def test_parallel_holes_of_one_instrument_err_alike_and_of_two_do_not() -> None:
     steep = 30.0 * DEG
     alike, apart = (

@@ -128,6 +128,37 @@ def test_a_joint_that_readings_share_stays_whole_in_the_azimuth_and_out_of_the_i
     assert azimuth_std == pytest.approx(math.hypot(3.0 * DEG, noise / math.sin(inclination_deg * DEG)), rel=0.02)
 
 
+@pytest.mark.parametrize("inclination_deg", [0.1, 179.9])
+def test_yaws_that_are_hardly_known_make_a_small_lean_neither_longer_nor_shorter(inclination_deg: float) -> None:
+    """Ten readings of yaws known to 20 deg: the mean of 3000 leans is the true one to 0.06 of the sigma of one."""
+    inclination, count, runs = inclination_deg * DEG, 10, 3000
+    tangents, covs = drawn(11, inclination, np.full(count, 20.0 * DEG), runs)
+    yaws = np.tile([(20.0 * DEG) ** 2, 0.0], (runs * count, 1))
+    begin = np.arange(0, runs * count + 1, count)
+    found = fuse_on_sphere(tangents.reshape(-1, 3), covs.reshape(-1, 3, 3), [NOTHING] * (runs * count), yaws, begin)
+    leans = np.array([math.hypot(*one.tangent[:2]) for one in found])
+    std = NOISE / G / math.sqrt(count)
+    longer = std**2 / (2.0 * math.sin(inclination))  # what noise across the lean adds
+    assert abs(float(leans.mean()) - math.sin(inclination) - longer) < 0.06 * std
+
+
+@pytest.mark.parametrize("inclination_deg", [10.0, 60.0, 90.0])
+def test_a_yaw_that_readings_share_bows_what_they_come_to_as_a_drawn_one_does(inclination_deg: float) -> None:
+    """The joint above four tubes is known to 25 deg: what a turn on the circle leaves the line by is drawn."""
+    std = 25.0 * DEG
+    tangents, covs = drawn(4, inclination_deg * DEG, np.full(4, 1e-4), 1)
+    readings = [
+        SphereDirection(t, c, Packed(std * np.array([[-t[1]], [t[0]], [0.0]])), (1e-8, std**2))
+        for t, c in zip(tangents[0], covs[0], strict=True)
+    ]
+    fused = fuse_by_bayes(readings)
+    turns = np.random.default_rng(6).normal(0.0, std, 400_000)
+    lean = fused.tangent[:2]
+    along = np.cos(turns) - 1.0  # of the lean, that a turn by so much takes off it
+    assert fused.bow[:2, :2] == pytest.approx(np.mean(along**2) * np.outer(lean, lean), rel=0.02)
+    assert sum(fused.yaw_vars) == pytest.approx(std**2, rel=0.01)
+
+
 @pytest.mark.parametrize("inclination_deg", [0.0, 1.0, 60.0, 90.0, 180.0])
 def test_one_reading_is_the_direction_and_stations_side_by_side_are_each_alone(inclination_deg: float) -> None:
     tangents, covs = drawn(4, inclination_deg * DEG, np.array([0.02, 0.3, 0.01]), 5)

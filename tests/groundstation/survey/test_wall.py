@@ -1,6 +1,7 @@
 """Walls of columns: as-built centres, the worst joint, the column that closes it, and who is whose neighbour."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from groundstation.survey.wall.wall_joints import (
     neighbours_in_line,
     worst_joint,
 )
+from groundstation.survey.wall.wall_verdict import judge_columns
 from groundstation.survey.well.arcs import on_arc
 from groundstation.survey.well.methods import Method, station_positions, station_tangents
 
@@ -252,3 +254,20 @@ def test_neighbours_in_a_triangular_grid_are_six_to_the_middle() -> None:
 
 def test_columns_far_apart_have_no_neighbours() -> None:
     assert neighbours_in_grid(np.array([[0.0, 0.0], [5.0, 5.0]]), SPACING).shape == (0, 2)
+
+
+@pytest.mark.parametrize(("own_plan", "is_told"), [((0.75, 0.75), True), ((2.0, 2.0), False)])
+def test_a_void_is_told_of_a_hole_whose_plan_comes_to_it(own_plan: tuple[float, float], is_told: bool) -> None:
+    """Eight columns about a place where none stands. The ninth begins 4 m away; its plan leads there, or elsewhere."""
+    depths = np.arange(0.0, 3.0)
+    heads = 0.75 * np.array([[r, c] for r in range(3) for c in range(3)], float)
+    centres = np.repeat(heads[:, None], 3, axis=1)
+    centres[4] = np.nan
+    covs = np.broadcast_to(1e-6 * np.eye(2), (9, 3, 2, 2))
+    columns = Columns.surveyed([f"G{k}" for k in range(9)], depths, centres, covs, heads, 0.6)
+    designs, planned = columns.designs.copy(), columns.planned.copy()
+    designs[4] = 4.0, 4.0
+    planned[4] = own_plan
+    columns = replace(columns, designs=designs, planned=planned)
+    found = judge_columns(columns, np.array([[4, 5]]), 0.8, grid_spacing=0.75, about=4)
+    assert [void.depth for void in found.voids] == ([0.0, 1.0, 2.0] if is_told else [])

@@ -17,6 +17,7 @@ from groundstation.survey.wall.wall_joints import (
     neighbours_in_grid,
     neighbours_in_line,
     pair_radii,
+    with_detours,
 )
 from groundstation.survey.wall.wall_system import system_probability
 from groundstation.survey.wall.wall_verdict import FindingKind, WallVerdict, judge_columns
@@ -207,3 +208,29 @@ def drawn_detour(heads: np.ndarray, std: float) -> float:
     r = np.full(DRAWS, RADIUS)
     direct, first, second = (joint_thickness(place[:, a], place[:, b], r, r) for a, b in ((0, 1), (0, 2), (2, 1)))
     return float(np.mean((direct < REQUIRED) & ((first < REQUIRED) | (second < REQUIRED))))
+
+
+def test_joints_that_are_hardly_ever_thin_add_up_beside_one_that_is() -> None:
+    """Thirty joints six sigmas off and one 5.6: each alone as good as nothing, and together most of what is left."""
+    std, limit = 0.003, largest_distance(RADIUS, REQUIRED)
+    gaps = limit - math.sqrt(2.0) * std * np.array([5.6, *[6.02] * 30])
+    heads = np.stack([np.zeros(32), np.concatenate([[0.0], np.cumsum(gaps)])], axis=1)
+    columns = columns_of(heads, std)
+    found = judge_joints(columns, neighbours_in_line(32, closed=False), REQUIRED)
+    tails = 0.5 * np.array([math.erfc(z / math.sqrt(2.0)) for z in (5.6, 6.02)])
+    whole = system_probability(columns, found, REQUIRED).probability
+    assert whole == pytest.approx(tails[0] + 30.0 * tails[1], rel=0.1)
+    assert whole > 2.5 * tails[0]
+
+
+def test_either_leg_of_a_way_by_a_remedial_column_may_be_thin() -> None:
+    """Two legs alike, each as doubtful as a joint of two columns that err by so much: the way twice as much."""
+    std, leg = 0.05, 0.75
+    heads = np.array([[0.0, 0.0], [0.0, 2.0 * leg], [0.0, leg]])
+    columns = columns_of(heads, std)
+    direct = judge_joints(columns, np.array([[0, 1]]), REQUIRED)
+    found = with_detours(columns, direct, [Detour(0, np.array([[0, 2], [2, 1]]))], REQUIRED)
+    limit = largest_distance(RADIUS, REQUIRED)
+    one = float(probability_beyond(np.array([0.0, leg]), 2.0 * std**2 * np.eye(2), limit))
+    assert 0.01 < one < 0.1
+    assert found.probability[0, -1] == pytest.approx(2.0 * one, rel=1e-9)
