@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -175,25 +175,29 @@ class Changes(ast.NodeVisitor):
         return self._lines[node.end_lineno - 1] + node.end_col_offset  # type: ignore[attr-defined]
 
 
-def mutants_of(root: Path, area: str, file: Path) -> Iterator[Mutant]:
-    """Every mutant of one file."""
+def changes_of(file: Path) -> list[Change]:
+    """Every change of one file, in the order of its text."""
+    return sorted(set(Changes(file.read_bytes()).found), key=lambda c: (c.begin, c.end, c.new))
+
+
+def mutant_of(root: Path, area: str, file: Path, change: Change) -> Mutant:
+    """The mutant of a change, whose name is its line."""
     source, name = file.read_bytes(), file.relative_to(root).as_posix()
-    for change in sorted(set(Changes(source).found), key=lambda c: (c.begin, c.end, c.new)):
-        text = source[: change.begin] + change.new.encode() + source[change.end :]
-        line = source[: change.begin].count(b"\n")
-        told = text.split(b"\n")[line].decode().strip()
-        old = source[change.begin : change.end].decode()
-        shown = f"{name}:{line + 1}: {old or 'nothing'} -> {change.new or 'nothing'}: {told} [{change.begin}]"
-        yield Mutant(shown, area, 8, name, old, change.new, text=text.decode())
+    text = source[: change.begin] + change.new.encode() + source[change.end :]
+    line = source[: change.begin].count(b"\n")
+    told = text.split(b"\n")[line].decode().strip()
+    old = source[change.begin : change.end].decode()
+    shown = f"{name}:{line + 1}: {old or 'nothing'} -> {change.new or 'nothing'}: {told} [{change.begin}]"
+    return Mutant(shown, area, 8, name, old, change.new, text=text.decode())
 
 
 def drawn_mutants(root: Path, size: int, seed: int) -> list[Mutant]:
     """So many mutants: a half of the survey's, which has nine in ten of all, and as many of each of the other areas."""
     drawn, draw = [], random.Random(seed)
     for area in AREAS:
-        found = [mutant for file in files_of(root, area) for mutant in mutants_of(root, area, file)]
+        found = [(file, change) for file in files_of(root, area) for change in changes_of(file)]
         share = size // 2 if area == "survey" else size // (2 * (len(AREAS) - 1))
-        drawn += draw.sample(found, min(share, len(found)))
+        drawn += [mutant_of(root, area, *one) for one in draw.sample(found, min(share, len(found)))]
     return sorted(drawn, key=lambda m: m.name)
 
 
