@@ -100,9 +100,9 @@ def test_a_method_that_is_asked_for_is_used_and_the_site_is_that_of_the_command(
         assert api.survey(RECORD, method=method.value).method is method
     one, other = (api.survey(RECORD, method=m.value) for m in (Method.MINIMUM_CURVATURE, Method.TANGENTIAL))
     assert abs(one.positions[-1] - other.positions[-1]).max() > 1e-3
-    request = SurveyRequest(file=RECORD, instrument="gyro-continuous", site=SiteFigures(), frame=FrameRequest())
+    request = SurveyRequest(file=RECORD, instrument="GYRO-NS-CT", site=SiteFigures(), frame=FrameRequest())
     command = api.answer_survey(request).found
-    library = api.survey(RECORD, instrument="gyro-continuous")
+    library = api.survey(RECORD, instrument="GYRO-NS-CT")
     depth = float(library.md[-1])
     np.testing.assert_allclose(library.covariance_at(depth), command.covariance_at(depth), rtol=1e-9)
 
