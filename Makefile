@@ -14,7 +14,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts bounds kernels kernels-of-floats kernels-of-integers bytecode browser fast tests planted statistical truth explore lock study studies soak seeds clean wheel test-socketcan test-firmware test-compose
+.PHONY: help rig test quick check lint types contracts bounds kernels kernels-of-floats kernels-of-integers bytecode browser fast tests planted mutation statistical truth explore lock study studies soak seeds clean wheel test-socketcan test-firmware test-compose
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-20s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -88,6 +88,9 @@ truth: $(STAMP)  ## the table of the field by a second world, beside the study's
 
 planted: kernels  ## plant every listed defect, one at a time, and see whether the tests notice
 	nice -n 10 $(BIN)/python tests/planted/run_planted.py $(PLANT)
+
+mutation: kernels  ## change an operator or a number of the pure modules, a sample by a seed, and see whether the tests notice
+	nice -n 10 $(BIN)/python tests/planted/run_mutants.py $(MUTATE)
 
 explore: $(STAMP)  ## the properties with examples that no run before has seen
 	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest -m hypothesis

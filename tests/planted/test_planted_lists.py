@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from choice_of_tests import choose_tests
 from defect_lists import KINDS, ROOT, Defect, DefectError, read_defects, sample_of
+from mutants import AREAS, changes_of, drawn_mutants, files_of, mutant_of
 
 DEFECTS = read_defects()
 
@@ -57,6 +58,43 @@ def test_a_file_without_tests_is_named() -> None:
         choose_tests(Defect("a name", "one", 1, "groundstation/gateway/page/static/js/plan.js", "a", "b"), ROOT)
     with pytest.raises(DefectError, match=r"got nowhere\.py"):
         choose_tests(Defect("a name", "one", 1, "telemetry/keys.py", "a", "b", ("nowhere.py",)), ROOT)
+
+
+SOURCE = '''"""± 1 < 2 of a docstring, which is no part of it."""
+LIMIT: Final = 3
+
+def f(a: int = 1, *, b: float = 0.5) -> bool:
+    for k in range(2):
+        if not a <= k and -b * 2.0 != k:
+            continue
+    return a // 2 in (4, 5) or f"{a + 1}"
+'''
+
+
+def test_every_change_of_a_source_is_made_once_at_its_place(tmp_path: Path) -> None:
+    file = tmp_path / "one.py"
+    file.write_text(SOURCE, encoding="utf-8")
+    found = [mutant_of(tmp_path, "survey", file, change) for change in changes_of(file)]
+    changes = sorted((mutant.old, mutant.new) for mutant in found)
+    assert changes == sorted([
+        ("3", "4"), ("1", "2"), ("0.5", "0.75"), ("2", "3"), ("not ", ""), ("<=", "<"), ("and", "or"), ("-", ""),
+        ("*", "/"), ("2.0", "3.0"), ("!=", "=="), ("continue", "break"), ("//", "/"), ("2", "3"), ("in", "not in"),
+        ("4", "5"), ("5", "6"), ("or", "and"),
+    ])  # fmt: skip
+    texts = [mutant.planted_text(tmp_path) for mutant in found]
+    assert len(set(texts)) == len(texts)
+    for text in texts:
+        compile(text, "one.py", "exec")
+        assert sum(a != b for a, b in zip(text.splitlines(), SOURCE.splitlines(), strict=True)) == 1
+
+
+@pytest.mark.slow
+def test_a_sample_of_mutants_is_the_same_by_its_seed_and_has_each_area() -> None:
+    one, again = drawn_mutants(ROOT, 40, 1), drawn_mutants(ROOT, 40, 1)
+    assert [m.name for m in one] == [m.name for m in again]
+    assert len({m.name for m in one}) == 40
+    assert {m.package for m in one} == set(AREAS)
+    assert all("kernels" not in file.parts for area in AREAS for file in files_of(ROOT, area))
 
 
 HARMLESS = """
