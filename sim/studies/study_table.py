@@ -82,7 +82,27 @@ STUDIES = by_name(
                 ResultTable(
                     "Lateral error: gyro against a held azimuth", shown=table_columns.FILTERED, rows="filtered"
                 ),
-                ResultTable("Azimuth error of a magnetic survey", shown=table_columns.MAGNETIC, rows="magnetic"),
+                ResultTable(
+                    "Azimuth error of a magnetic survey",
+                    table_columns.MAGNETIC,
+                    table_columns.MAGNETIC,
+                    rows="magnetic",
+                    suffix="-magnetic",
+                ),
+                ResultTable(
+                    "By the accumulation of the print",
+                    table_columns.PRINTED,
+                    table_columns.PRINTED,
+                    rows="printed",
+                    suffix="-as-printed",
+                ),
+                ResultTable(
+                    "MPU-6500 at the toe, by either figure of its datasheet",
+                    table_columns.READINGS,
+                    table_columns.READINGS,
+                    rows="readings",
+                    suffix="-mpu6500",
+                ),
             ),
         ),
         Study(

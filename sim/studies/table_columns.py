@@ -77,7 +77,20 @@ FILTERED: Columns = (
     ("unfiltered_cm", "gyro, cm"),
     ("filtered_cm", "0.25 deg azimuth, cm"),
 )
-MAGNETIC: Columns = (("station", "station"), ("magnetic_deg", "magnetic, deg"), ("filtered_deg", "filtered, deg"))
+MAGNETIC: Columns = (
+    ("station", "station"),
+    ("as_printed_deg", "as printed, deg"),
+    ("magnetic_deg", "magnetic, deg"),
+    ("filtered_deg", "filtered, deg"),
+)
+PRINTED = plain_columns("instrument", "station", "axis", "published", "as_printed", "ratio", "ours", "unit")
+READINGS: Columns = (
+    ("reading", "accelerometers across"),
+    ("unfiltered_cm", "gyro, cm"),
+    ("filtered_cm", "0.25 deg azimuth, cm"),
+    ("ratio", "ratio"),
+    ("published", "published"),
+)
 SWEEPS = plain_columns("changed", "value_deg", "scheme", "station", "north_cm", "east_cm", "tvd_cm")
 TUNING: Columns = (
     ("case", "case"),

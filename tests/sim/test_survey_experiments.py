@@ -1,6 +1,7 @@
 """Published survey figures beside ours, and whether the claimed ellipses hold the truth."""
 
 import math
+from typing import Any
 
 import pytest
 
@@ -44,8 +45,48 @@ def test_every_printed_region_stands_beside_ours() -> None:
     filtered = {row["instrument"]: row for row in result["filtered"] if row["station"] == 10}
     assert filtered["vectornav-100t"]["filtered_cm"] < filtered["vectornav-100t"]["unfiltered_cm"]
     for row, inclination, azimuth in zip(result["magnetic"], (0.08, 0.32), (248.2, 243.4), strict=False):
-        wanted = 0.25 + 0.6 * math.sin(math.radians(inclination)) * math.sin(math.radians(azimuth))
-        assert row["magnetic_deg"] == pytest.approx(wanted, abs=1e-4)
+        wave = 0.6 * math.sin(math.radians(inclination)) * math.sin(math.radians(azimuth))
+        assert row["as_printed_deg"] == pytest.approx(0.25 + wave, abs=1e-4)
+        assert row["magnetic_deg"] == pytest.approx(0.25 - wave, abs=1e-4)  # west of north: larger, as its text says
+
+
+def printed_rows(instrument: str, axis: str) -> list[dict[str, Any]]:
+    rows = regions.run_study(lambda: None)["printed"]
+    return [row for row in rows if row["instrument"] == instrument and row["axis"] == axis]
+
+
+def test_the_depths_of_the_probe_are_as_printed() -> None:
+    """Table 4.5: 2.1 cm a station, independent, and half the lever at the last: 2.1 sqrt(9.25), printed 6.38."""
+    rows = printed_rows("rst-inclinometer", "tvd")
+    for n, row in enumerate(rows[:-1], 1):
+        assert row["as_printed"] == pytest.approx(2.1 * math.sqrt(n), abs=0.001)
+        assert row["as_printed"] == pytest.approx(row["published"], abs=0.021)
+    assert rows[-1]["as_printed"] == pytest.approx(2.1 * math.sqrt(9.25), abs=0.001)
+    assert rows[-1]["as_printed"] == pytest.approx(rows[-1]["published"], abs=0.01)
+
+
+def test_the_print_of_the_best_probe_is_near_its_accumulation() -> None:
+    """Table 4.14, column A; by hand its first row: 2 m by 5.061 mm/s^2 over g, seen east, at two sigmas."""
+    rows = printed_rows("ipst-rqh", "east")
+    first = 2.0 * 200.0 * math.hypot(4.9653e-3, 9.81e-4) / 9.81 * math.sin(math.radians(248.1986))
+    assert rows[0]["as_printed"] == pytest.approx(-first, rel=1e-4)
+    assert all(1.0 < row["ratio"] < 1.14 for row in rows)
+    assert all(row["ours"] != row["as_printed"] for row in rows)
+
+
+def test_a_drift_that_is_taken_for_radians_is_what_the_gyroscopes_were_printed_by() -> None:
+    """Table 4.8, column B at the toe: 43.96 cm; in true units the same drift is 57 times smaller."""
+    row = printed_rows("vectornav-100t", "north")[-1]
+    assert 0.5 < row["ratio"] < 2.0
+    assert row["as_printed"] / math.degrees(1.0) < 0.05 * row["published"]
+
+
+def test_one_datasheet_read_in_two_ways() -> None:
+    shipped, tilted, calibrated = regions.run_study(lambda: None)["readings"]
+    assert shipped["ratio"] == pytest.approx(1.0, abs=0.005)
+    assert tilted["unfiltered_cm"] == pytest.approx(6.7, abs=0.1)
+    assert calibrated["ratio"] == pytest.approx(9.5, rel=0.1)
+    assert {row["published"] for row in (shipped, tilted, calibrated)} == {9.5}
 
 
 @pytest.mark.parametrize("wells", [100, pytest.param(500, marks=pytest.mark.statistical)])

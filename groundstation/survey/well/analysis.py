@@ -232,5 +232,8 @@ def _turns_azimuth_alone(term: Term) -> bool:
 
 
 def magnetic_error(inclination: Array, azimuth: Array) -> Array:
-    """Azimuth error (rad) of a magnetic survey: 0.25 deg + 0.6 deg sin I sin A. Source: thesis Fig. 4.23."""
-    return np.radians(0.25 + 0.6 * np.sin(inclination) * np.sin(azimuth))
+    """Azimuth error (rad) of a magnetic survey: 0.25 deg + 0.6 deg sin I |sin A|, larger to the east and to the west.
+
+    Source: thesis Fig. 4.23, whose formula has sin A with its sign, against its own text.
+    """
+    return np.radians(0.25 + 0.6 * np.sin(inclination) * np.abs(np.sin(azimuth)))
