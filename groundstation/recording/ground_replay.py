@@ -54,7 +54,7 @@ class Replayed:
     """
 
     def __init__(self, begin: Intake, folder: Path, rig: str) -> None:
-        settings = {name: value for name, value in begin.content["settings"].items() if name != "rig"}
+        settings = settings_of(begin)
         config = checked_config(rig=rig, folder=folder, **settings)
         self.ground = GroundProcess(config, lambda _below: int(begin.content["start"]) - 1)
         self.events = self.missing = 0
@@ -71,6 +71,17 @@ class Replayed:
         self._clock.rig_now, self._clock.epoch = event.rig_now, event.epoch
         apply_event(self.ground, event)
         self.ground.take_frames(event.now)  # discarded
+
+
+def settings_of(begin: Intake) -> dict[str, Any]:
+    """Settings of the ground station that recorded; one of an earlier version may say what is no longer a setting.
+
+    Its ``collar_std_deg`` was 0 where nothing was told of the collar, which is now a setting that is not there.
+    """
+    settings = {name: value for name, value in begin.content["settings"].items() if name != "rig"}
+    if settings.get("collar_std_deg") == 0.0:
+        del settings["collar_std_deg"]
+    return settings
 
 
 def open_replay(recording: Recording, folder: Path) -> tuple[Replayed, Iterator[Intake]]:

@@ -1,9 +1,9 @@
 """Layouts of saved states that earlier versions wrote, and what is carried over from one of them.
 
-A firmware update must not make a tube forget what it has learnt: biases, mounts, yaw, trust, the twist. Each layout names
-its fields in ``saved_layouts.json``; what a layout and the present one both know, by the same name, type and shape, is
-carried over, and all else starts as on a new node. ``docs/make_layouts.py`` adds the present layout, which a test asks
-for; a field whose meaning changes gets another name.
+A firmware update must not make a tube forget what it has learnt: biases, mounts, yaw, trust, the twist. Each layout
+names its fields in ``saved_layouts.json``; what a layout and the present one both know, by the same name, type and
+shape, is carried over, and all else starts as on a new node. ``docs/make_layouts.py`` adds the present layout, which a
+test asks for; a field whose meaning changes gets another name.
 """
 
 from __future__ import annotations
