@@ -19,7 +19,7 @@ from groundstation.errors import StoreError
 from groundstation.recording.ground_replay import replay_summary
 from groundstation.recording.recording_file import Recording
 from groundstation.service.disk.ground_store import Store
-from node.firmware.saved_layouts import Carried, carry_over, described_dtype, known_layouts
+from node.firmware.saved_layouts import CarriedState, carry_over, described_dtype, known_layouts
 from node.firmware.saved_state import CHECKSUM, HEADER, layout_name, unpack_state_slot
 from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import PERIOD
@@ -197,10 +197,10 @@ def test_of_every_earlier_layout_what_both_know_is_carried_over_and_nothing_else
     slot = head + CHECKSUM.pack(zlib.crc32(body, zlib.crc32(head))) + body
     found = unpack_state_slot(slot)
     assert (found.blob, found.generation, found.saved_at) == (b"blob", 7, 12.5)
-    assert isinstance(found.carried, Carried)
+    assert isinstance(found.carried, CarriedState)
     there, here = leaves(record), leaves(found.nodes[["filter", "mount", "guard", "twist", "joints"]])
     shared = [path for path in here if path in there and here[path].shape == there[path].shape]
-    assert found.carried == Carried(name, len(shared), len(here) - len(shared))
+    assert found.carried == CarriedState(name, len(shared), len(here) - len(shared))
     for path in shared:
         assert np.array_equal(here[path], there[path]), path
     torn = bytearray(slot)

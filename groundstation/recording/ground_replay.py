@@ -22,6 +22,9 @@ REPEATED_ORDERS = ("accept_depth", "accept_joints", "alarm", *SETUP_COMMANDS)
 
 
 @dataclass(slots=True)
+OF_THE_COLLAR = ("collar_inclination_deg", "collar_azimuth_deg", "collar_std_deg")
+
+
 class TapeClock:
     """Rig time as it was when the current event was taken in."""
 
@@ -76,11 +79,11 @@ class Replayed:
 def settings_of(begin: Intake) -> dict[str, Any]:
     """Settings of the ground station that recorded; one of an earlier version may say what is no longer a setting.
 
-    Its ``collar_std_deg`` was 0 where nothing was told of the collar, which is now a setting that is not there.
+    A collar whose direction had no error was one of which nothing was told, and now is one that is not stated.
     """
     settings = {name: value for name, value in begin.content["settings"].items() if name != "rig"}
     if settings.get("collar_std_deg") == 0.0:
-        del settings["collar_std_deg"]
+        settings = {name: value for name, value in settings.items() if name not in OF_THE_COLLAR}
     return settings
 
 

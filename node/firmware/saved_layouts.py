@@ -26,7 +26,7 @@ SHAPE: Final = re.compile(r"\[([\d, ]+)\]")
 
 
 @dataclass(frozen=True, slots=True)
-class Carried:
+class CarriedState:
     """How much of a state of another layout was carried over.
 
     Attributes

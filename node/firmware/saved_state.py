@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from node.errors import SavedStateError
-from node.firmware.saved_layouts import Carried, carry_over, dtype_description, known_layouts
+from node.firmware.saved_layouts import CarriedState, carry_over, dtype_description, known_layouts
 from node.kernels.arithmetic.formats import Array
 from node.kernels.filter.resets import resume_filter
 from node.kernels.record.filter_record import default_config
@@ -46,7 +46,7 @@ class Saved:
     blob: bytes
     generation: int
     saved_at: float
-    carried: Carried | None = None
+    carried: CarriedState | None = None
 
 
 FIELDS: Final = zlib.crc32("".join(dtype_description(NODE[name]) for name in KEPT).encode())
@@ -97,11 +97,11 @@ def unpack_state_slot(data: bytes) -> Saved:
     return Saved(np.frombuffer(record, NODE), body[state_size:], generation, saved_at, carried)
 
 
-def carried_state(name: str, kept: bytes) -> tuple[bytes, Carried]:
+def carried_state(name: str, kept: bytes) -> tuple[bytes, CarriedState]:
     """What of a record is kept, carried over from the layout ``name``; the rest is that of a node that is new."""
     nodes = new_node(default_config())
     carried, fresh = carry_over(np.frombuffer(kept, known_layouts()[name]), nodes[list(KEPT)])
-    return nodes.tobytes()[:KEPT_SIZE], Carried(name, carried, fresh)
+    return nodes.tobytes()[:KEPT_SIZE], CarriedState(name, carried, fresh)
 
 
 def resume_node(nodes: Array, configs: Array) -> bool:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Final
 
 from node.errors import SavedStateError
-from node.firmware.saved_layouts import Carried
+from node.firmware.saved_layouts import CarriedState
 from node.firmware.saved_state import Saved, pack_state_slot, unpack_state_slot
 from node.kernels.arithmetic.formats import Array
 from telemetry.runtime.disk import MACHINE, Disk
@@ -43,7 +43,7 @@ class Journal:
         self._there: set[int] = set()  # places whose file has its name on the disk
         self._has_looked = False
         self.worn: set[int] = set()
-        self.carried: Carried | None = None
+        self.carried: CarriedState | None = None
         with contextlib.suppress(OSError):  # the first save says what is wrong with it
             disk.make_folder(folder)
 
