@@ -21,10 +21,10 @@ from telemetry.errors import BorechainError
 REPEATED_ORDERS = ("accept_depth", "accept_joints", "alarm", *SETUP_COMMANDS)
 
 
-@dataclass(slots=True)
 OF_THE_COLLAR = ("collar_inclination_deg", "collar_azimuth_deg", "collar_std_deg")
 
 
+@dataclass(slots=True)
 class TapeClock:
     """Rig time as it was when the current event was taken in."""
 

@@ -82,6 +82,7 @@ def page_application(process: GroundProcess, page: PageSettings, hub: Hub, signe
             Route("/api/cmd/{name}", handlers.order, methods=["POST"]),
             Route("/api/tables/{path:path}.csv", handlers.table),
             Route("/api/reports/{subject}.pdf", handlers.report),
+            Route("/api/exports/{what}.{form}", handlers.export),
             Route("/api/{path:path}", handlers.answer),
         ],
         middleware=[

@@ -15,6 +15,7 @@ from starlette.types import Receive, Scope, Send
 from groundstation.errors import GroundError, SelectorError
 from groundstation.gateway.page.answer_hub import Hub, server_sent_event
 from groundstation.gateway.page.connections import SignedPeers
+from groundstation.gateway.page.exports import live_export
 from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.gateway.page.passwords import (
     DRILLER,
@@ -99,6 +100,13 @@ class PageHandlers:
         self._check_reader(request)
         name, made = await self._reporter.pdf(request.path_params["subject"])
         return Response(made, media_type="application/pdf", headers=saved_as(name))
+
+    async def export(self, request: Request) -> Response:
+        """``GET /api/exports/hole.FORMAT`` and ``wall.FORMAT``: a file of another program."""
+        self._check_reader(request)
+        what, form = request.path_params["what"], request.path_params["form"]
+        name, media, made = await live_export(self._process.model, what, form, dict(request.query_params))
+        return Response(made, media_type=media, headers=saved_as(name))
 
     async def order(self, request: Request) -> Response:
         """``POST /api/cmd/NAME``: order something; ``?wait=true`` answers when the tube has."""
