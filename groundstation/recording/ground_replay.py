@@ -21,6 +21,9 @@ from telemetry.errors import BorechainError
 REPEATED_ORDERS = ("accept_depth", "accept_joints", "alarm", *SETUP_COMMANDS)
 
 
+OF_THE_COLLAR = ("collar_inclination_deg", "collar_azimuth_deg", "collar_std_deg")
+
+
 @dataclass(slots=True)
 class TapeClock:
     """Rig time as it was when the current event was taken in."""
@@ -54,7 +57,7 @@ class Replayed:
     """
 
     def __init__(self, begin: Intake, folder: Path, rig: str) -> None:
-        settings = {name: value for name, value in begin.content["settings"].items() if name != "rig"}
+        settings = settings_of(begin)
         config = checked_config(rig=rig, folder=folder, **settings)
         self.ground = GroundProcess(config, lambda _below: int(begin.content["start"]) - 1)
         self.events = self.missing = 0
@@ -71,6 +74,17 @@ class Replayed:
         self._clock.rig_now, self._clock.epoch = event.rig_now, event.epoch
         apply_event(self.ground, event)
         self.ground.take_frames(event.now)  # discarded
+
+
+def settings_of(begin: Intake) -> dict[str, Any]:
+    """Settings of the ground station that recorded; one of an earlier version may say what is no longer a setting.
+
+    A collar whose direction had no error was one of which nothing was told, and now is one that is not stated.
+    """
+    settings = {name: value for name, value in begin.content["settings"].items() if name != "rig"}
+    if settings.get("collar_std_deg") == 0.0:
+        settings = {name: value for name, value in settings.items() if name not in OF_THE_COLLAR}
+    return settings
 
 
 def open_replay(recording: Recording, folder: Path) -> tuple[Replayed, Iterator[Intake]]:

@@ -2,7 +2,8 @@
 
 Layout of a slot: header, checksum, what of the record is kept, blob. The header names the layout of the record by the
 version of ``node.kernels.record.node_record`` and a checksum of what its fields are, so that neither a forgotten
-version nor a changed meaning is taken for the present one.
+version nor a changed meaning is taken for the present one. Of an earlier layout what both know is carried over
+(``saved_layouts``).
 """
 
 from __future__ import annotations
@@ -10,14 +11,16 @@ from __future__ import annotations
 import struct
 import zlib
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from node.errors import SavedStateError
+from node.firmware.saved_layouts import CarriedState, carry_over, dtype_description, known_layouts
 from node.kernels.arithmetic.formats import Array
 from node.kernels.filter.resets import resume_filter
-from node.kernels.record.node_record import KEPT, KEPT_SIZE, NODE, NODE_LAYOUT, forget_session
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import KEPT, KEPT_SIZE, NODE, NODE_LAYOUT, forget_session, new_node
 
 # magic, version and format, checksum of the fields, generation, bytes of state and blob, when it was saved (s)
 HEADER: Final = struct.Struct("<4sHHIQIId")
@@ -36,25 +39,14 @@ class Saved:
     blob : of the telemetry
     generation : number in the sequence of saves
     saved_at : s, the node's own clock, end of the newest cycle in the record; no clock runs while the power is off
+    carried : how much of it was carried over from another layout; None where it is of the present one
     """
 
     nodes: Array
     blob: bytes
     generation: int
     saved_at: float
-
-
-def dtype_description(dtype: np.dtype[Any]) -> str:
-    """All that fixes the bytes of a record: names, places, types and shapes of its fields, and its size."""
-    if dtype.subdtype is not None:
-        base, shape = dtype.subdtype
-        return f"{dtype_description(base)}{list(shape)}"
-    if dtype.fields is None:
-        return dtype.str
-    fields = (
-        f"{name}@{dtype.fields[name][1]}:{dtype_description(dtype.fields[name][0])}" for name in dtype.names or ()
-    )
-    return f"{{{','.join(fields)}}}{dtype.itemsize}"
+    carried: CarriedState | None = None
 
 
 FIELDS: Final = zlib.crc32("".join(dtype_description(NODE[name]) for name in KEPT).encode())
@@ -87,16 +79,29 @@ def unpack_state_slot(data: bytes) -> Saved:
     magic, version, form, fields, generation, state_size, blob_size, saved_at = HEADER.unpack_from(data)
     if magic != MAGIC:
         raise SavedStateError(f"saved state: expected {MAGIC!r} first, got {magic!r}")
-    if (version, form, fields) != (NODE_LAYOUT, FORMAT, FIELDS):
-        got = f"{version} without a checksum of its fields" if form == 0 else layout_name(version, fields)
-        raise SavedStateError(f"saved state: expected layout {layout_name()}, got {got}")
+    name, is_present = layout_name(version, fields), (version, fields) == (NODE_LAYOUT, FIELDS)
+    if form != FORMAT or not (is_present or name in known_layouts()):
+        got = f"{version} without a checksum of its fields" if form == 0 else name
+        later = ", which a later version wrote" if version > NODE_LAYOUT else ""
+        raise SavedStateError(f"saved state: expected layout {layout_name()}, got {got}{later}")
     (crc,) = CHECKSUM.unpack_from(data, HEADER.size)
     body = data[begin : begin + state_size + blob_size]
-    is_whole = state_size == KEPT_SIZE and len(body) == state_size + blob_size
+    expected = KEPT_SIZE if is_present else known_layouts()[name].itemsize
+    is_whole = state_size == expected and len(body) == state_size + blob_size
     if not is_whole or zlib.crc32(body, zlib.crc32(data[: HEADER.size])) != crc:
         raise SavedStateError("saved state: checksum does not fit, the slot is torn or damaged")
-    record = bytearray(body[:state_size]) + bytearray(NODE.itemsize - KEPT_SIZE)
-    return Saved(np.frombuffer(record, NODE), body[state_size:], generation, saved_at)
+    kept, carried = body[:state_size], None
+    if not is_present:
+        kept, carried = carried_state(name, kept)
+    record = bytearray(kept) + bytearray(NODE.itemsize - KEPT_SIZE)
+    return Saved(np.frombuffer(record, NODE), body[state_size:], generation, saved_at, carried)
+
+
+def carried_state(name: str, kept: bytes) -> tuple[bytes, CarriedState]:
+    """What of a record is kept, carried over from the layout ``name``; the rest is that of a node that is new."""
+    nodes = new_node(default_config())
+    carried, fresh = carry_over(np.frombuffer(kept, known_layouts()[name]), nodes[list(KEPT)])
+    return nodes.tobytes()[:KEPT_SIZE], CarriedState(name, carried, fresh)
 
 
 def resume_node(nodes: Array, configs: Array) -> bool:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Final
 
 from node.errors import SavedStateError
+from node.firmware.saved_layouts import CarriedState
 from node.firmware.saved_state import Saved, pack_state_slot, unpack_state_slot
 from node.kernels.arithmetic.formats import Array
 from telemetry.runtime.disk import MACHINE, Disk
@@ -31,6 +32,7 @@ class Journal:
     Attributes
     ----------
     worn : places of the slots that did not take what was written, since this start; they are passed over
+    carried : how much of what was loaded was carried over from another layout; None where it is of the present one
     """
 
     def __init__(self, folder: Path, slots: int = SLOTS, disk: Disk = MACHINE) -> None:
@@ -41,6 +43,7 @@ class Journal:
         self._there: set[int] = set()  # places whose file has its name on the disk
         self._has_looked = False
         self.worn: set[int] = set()
+        self.carried: CarriedState | None = None
         with contextlib.suppress(OSError):  # the first save says what is wrong with it
             disk.make_folder(folder)
 
@@ -67,7 +70,7 @@ class Journal:
                     best, self._newest = found, place
             self._there.add(place)
         if best is not None:
-            self._generation = max(self._generation, best.generation)
+            self._generation, self.carried = max(self._generation, best.generation), best.carried
             return best.nodes, best.blob
         if faults:
             raise SavedStateError("; ".join(f"{fault} ({', '.join(names)})" for fault, names in faults.items()))

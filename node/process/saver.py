@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from node.errors import SavedStateError
+from node.firmware.saved_layouts import CarriedState
 from node.kernels.arithmetic.formats import Array
 from node.process.journal import SLOTS, Journal
 from telemetry.application.endpoint_state import STATE_LAYOUT, layout_of
@@ -94,6 +95,11 @@ class Saver:
         limit = RETRY_EVERY if self._refused else SAVE_EVERY
         if self._cycles >= limit or rest_is_over:
             self.due = True
+
+    @property
+    def carried(self) -> CarriedState | None:
+        """How much of what was loaded was carried over from another layout; None where it is of the present one."""
+        return self._journal.carried
 
     @property
     def is_refused(self) -> bool:

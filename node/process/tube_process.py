@@ -335,6 +335,9 @@ class TubeProcess(Process):
         self._send(self.tube.boot_event(rig_now), now)
         if self._saver.fault:
             self._send_event(Severity.ERROR, "saved_state_lost", {"detail": self._saver.fault[:200]})
+        if (carried := self._saver.carried) is not None:
+            told: dict[str, Scalar] = {"layout": carried.layout, "carried": carried.fields, "new": carried.fresh}
+            self._send_event(Severity.INFO, "saved_state_carried", told)
         if self._counter_fault:
             self._send_event(Severity.ERROR, "boot_counter_lost", {"detail": self._counter_fault[:200]})
         if self.endpoint.counters["bad_saved_state"]:

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node.errors import SavedStateError
-from node.firmware.saved_state import dtype_description, layout_name, pack_state_slot, resume_node, unpack_state_slot
+from node.firmware.saved_layouts import dtype_description
+from node.firmware.saved_state import layout_name, pack_state_slot, resume_node, unpack_state_slot
 from node.kernels.arithmetic.formats import DEG
 from node.kernels.record.filter_record import Err, default_config
 from node.kernels.record.node_record import KEPT_SIZE, new_node
