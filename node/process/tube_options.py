@@ -78,7 +78,7 @@ class TubeRequest:
         return UNTOLD if read_deg is None else MakeUpAngle(math.radians(read_deg), math.radians(self.joint_std_deg))
 
 
-tube_options = gather_options(
+SETTING_OPTIONS = (
     click.option("--tube", type=int, required=True, help="Number of the tube, 1 is the lowest."),
     click.option(
         "--drive-joint-deg",
@@ -169,6 +169,10 @@ tube_options = gather_options(
         multiple=True,
         help="Calibration file of an IMU's accelerometer. Once for each IMU.",
     ),
+)  # what the crew knows of a tube; the other options say where its node runs
+
+tube_options = gather_options(
+    *SETTING_OPTIONS,
     clock_option,
     above_option,
     below_option,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import ast
 import re
 
-from node.translation.c_expressions import FOLDED, CContext, CExpressions
+from node.translation.c_expressions import FOLDED, CExpressions
+from node.translation.c_operands import CContext
 from node.translation.c_value import SUM, CValue, c_word, several_values
 from node.translation.kernel_source import KernelSource, UntranslatableKernelError
 from node.translation.kinds_of_values import (

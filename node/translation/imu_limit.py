@@ -9,11 +9,12 @@ from __future__ import annotations
 import ast
 import importlib.util
 import json
+import pickle
 import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from node.translation.c_file import CFiles
@@ -43,6 +44,22 @@ def write_for_imus(count: int) -> CFiles:
     return CFiles(header, code, digest, tuple(entries))
 
 
+def record_kinds(count: int) -> tuple[Any, Any, Any]:
+    """Dtypes of settings, parameters and record of a node in integers with room for ``count`` IMUs."""
+    if count == import_module(MODULE).MAX_IMUS:
+        kinds = _own_kinds()
+    else:
+        command = [sys.executable, "-P", "-m", "node.translation.imu_limit", str(count), "kinds"]
+        kinds = pickle.loads(subprocess.run(command, check=True, capture_output=True).stdout)
+    return kinds
+
+
+def _own_kinds() -> tuple[Any, Any, Any]:
+    from node.kernels.record.integer_node import FIXED_NODE, FIXED_PARAMETERS, FIXED_SETTINGS
+
+    return FIXED_SETTINGS, FIXED_PARAMETERS, FIXED_NODE
+
+
 def limit_imus(count: int) -> None:
     """Have the records of this process, none of which is imported yet, made for ``count`` IMUs."""
     spec = importlib.util.find_spec(MODULE)
@@ -61,6 +78,9 @@ def limit_imus(count: int) -> None:
 
 def _main() -> None:
     limit_imus(int(sys.argv[1]))
+    if sys.argv[2:] == ["kinds"]:
+        sys.stdout.buffer.write(pickle.dumps(_own_kinds()))
+        return
     from node.translation.c_file import write_c_files
 
     sys.stdout.write(json.dumps(write_c_files()))

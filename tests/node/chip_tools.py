@@ -1,15 +1,28 @@
 """Compiling and running the step in C for its tests, and what to install where that cannot be."""
 
 import itertools
+import json
+import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+from recorded_calls import Layout, layout_of
 
 from node.translation.chip_program import BARE
 from node.translation.toolchains import OPTIONS, TOOLCHAINS
 
+SMALLER = """
+import json
+from node.translation.imu_limit import limit_imus
+limit_imus(1)
+from node.kernels.record.integer_node import FIXED_NODE, FIXED_PARAMETERS, FIXED_SETTINGS
+from recorded_calls import fields_of
+sizes = FIXED_NODE.itemsize, FIXED_SETTINGS.itemsize, 2 * FIXED_PARAMETERS.itemsize, 1
+print(json.dumps([fields_of(FIXED_NODE), fields_of(FIXED_SETTINGS), sizes]))
+"""
 HERE = Path(__file__).parent / "chip"
 RISCV_MEMORY = ("flash=0x80000000", "flash_size=0x400000", "ram=0x80400000", "ram_size=0x1000000", "stack_size=0x8000")
 HOST = ("-std=gnu99", "-O1", "-fwrapv")
@@ -88,3 +101,14 @@ def run_on_chip(target: str, program: Path, folder: Path) -> subprocess.Complete
     quiet = ("-nographic", "-monitor", "none", "-serial", "null")
     hosted = ("-semihosting-config", "enable=on,target=native")
     return run_program(program_name, *machine, *quiet, *hosted, "-kernel", program, folder=folder)
+
+
+def layout_of_one() -> Layout:
+    """Where the records of a node of one IMU lie."""
+    paths = os.pathsep.join(path for path in sys.path if path)
+    done = run_program(
+        sys.executable, "-c", SMALLER, folder=Path.cwd(), environment={**os.environ, "PYTHONPATH": paths}
+    )
+    assert done.returncode == 0, done.stderr
+    node, settings, sizes = json.loads(done.stdout)
+    return layout_of(node, settings, sizes)

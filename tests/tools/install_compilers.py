@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import subprocess
-import sys
 
-from install_browser import as_root
+from debian_packages import install
 
+REMEDY = "install them with the system's package manager, then run this again"
 PROGRAMS = {
     "gcc": "gcc",
     "clang": "clang",
@@ -29,20 +27,8 @@ def lacking() -> list[str]:
 def main() -> None:
     """Install what is lacking."""
     wanted = lacking()
-    if not wanted:
-        return
-    refusal = f"expected {', '.join(wanted)} for the tests of the firmware"
-    before, apt = as_root(), shutil.which("apt-get")
-    if before is None or apt is None:
-        sys.exit(f"{refusal}: install them with the system's package manager, then run this again")
-    settings = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
-    for words in (["update"], ["install", "--yes", "--no-install-recommends", *wanted]):
-        done = subprocess.run(
-            [*before, apt, "--quiet=2", *words], env=settings, capture_output=True, text=True, check=False
-        )
-        if done.returncode:
-            last = (done.stderr.strip().splitlines() or ["no reason"])[-1]
-            sys.exit(f"{refusal}: apt-get {words[0]}: {last}")
+    if wanted:
+        install(wanted, f"expected {', '.join(wanted)} for the tests of the firmware", REMEDY)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,9 @@ import click
 
 from borechain.cli.faults import plain_faults
 from borechain.cli.whole_files import make_folder
+from node.process.cluster_options import ClusterRequest
+from node.process.tube_options import SETTING_OPTIONS, TubeRequest
+from telemetry.runtime.typed_options import gather_options
 
 TARGETS = ("c", "cortex-m4", "cortex-m0plus", "riscv32")
 
@@ -52,3 +55,36 @@ def build(target: str, imus: int, out: Path) -> None:
     click.echo(f"source {built.digest}, {built.memory} bytes of records a node")
     if built.size is not None:
         click.echo(f"{built.size.flash} bytes of flash on {target}")
+
+
+@firmware.command()
+@gather_options(*SETTING_OPTIONS, imus=ClusterRequest, request=TubeRequest)
+@click.option(
+    "--room", type=click.IntRange(1, 8), default=8, show_default=True, help="IMUs that the chip's program has room for."
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("firmware-build"),
+    show_default=True,
+    help="Folder of what is written.",
+)
+@plain_faults
+def provision(request: TubeRequest, room: int, out: Path) -> None:
+    """Write what a tube's chip begins with, as an image for a page of its flash, and the header that loads it.
+
+    The options are those of `borechain node`, and --room is the --imus of `borechain firmware build`.
+
+    \b
+    Examples:
+      borechain firmware provision --tube 3 --drive-joint-deg 12.5 --lower-joint-deg 4.0 --out tube-3
+      borechain firmware provision --tube 3 --imu-gyroscope gyroscope.json --room 1 --out tube-3
+    """
+    from node.firmware.node_image import provision_node
+
+    settings = request.to_settings()
+    make_folder(out)
+    made = provision_node(settings, room, out)
+    for path in made.files:
+        click.echo(path)
+    click.echo(f"tube {settings.tube}, source {made.digest}, {made.size} bytes")

@@ -6,6 +6,9 @@
 #include <string.h>
 
 #include "borechain_step.h"
+#ifdef FROM_IMAGE
+#include "borechain_image.h"
+#endif
 
 enum { NODE, SETTINGS, PARAMETERS, STEP, AIDING, LAST };
 #define SLOTS 4
@@ -119,6 +122,14 @@ int main(int count, char **names)
         puts("no calls.bin");
         return 2;
     }
+#ifdef FROM_IMAGE
+    static unsigned char page[1 << 17];
+    FILE *image = fopen(names[count - 1], "rb");
+    if (image == NULL || borechain_load(page, fread(page, 1, sizeof page, image), settings, parameters[0], nodes)) {
+        puts("no image");
+        return 2;
+    }
+#endif
     begin();
     while (fread(head, 4, 3, file) == 3) {
         if (head[2] > (int32_t)sizeof body || fread(&body, 1, (size_t)head[2], file) != (size_t)head[2]) {

@@ -3,7 +3,6 @@
 The oracle is the numba step; the C is made from the source by another translator and compiled by another compiler.
 """
 
-import json
 import os
 import re
 import subprocess
@@ -11,23 +10,14 @@ import sys
 from pathlib import Path
 
 import pytest
-from chip_tools import compile_replay, needs, needs_gcc, run_program, said_numbers
+from chip_tools import compile_replay, layout_of_one, needs, needs_gcc, run_program, said_numbers
 from chip_worlds import every_world, rough_node
-from recorded_calls import Layout, layout_of, record_calls
+from recorded_calls import record_calls
 
 from node.translation.c_file import CODE, HEADER, CFiles, write_c_files
 from node.translation.imu_limit import write_for_imus
 
 CHECKED = ("-fno-wrapv", "-fsanitize=undefined,bounds-strict,address", "-fno-sanitize-recover=all")
-SMALLER = """
-import json
-from node.translation.imu_limit import limit_imus
-limit_imus(1)
-from node.kernels.record.integer_node import FIXED_NODE, FIXED_PARAMETERS, FIXED_SETTINGS
-from recorded_calls import fields_of
-sizes = FIXED_NODE.itemsize, FIXED_SETTINGS.itemsize, 2 * FIXED_PARAMETERS.itemsize, 1
-print(json.dumps([fields_of(FIXED_NODE), fields_of(FIXED_SETTINGS), sizes]))
-"""
 
 
 @pytest.fixture(scope="module")
@@ -51,17 +41,6 @@ def calls(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("calls") / "calls.bin"
     assert record_calls(path, *every_world(700)) > 12_000
     return path
-
-
-def layout_of_one() -> Layout:
-    """Where the records of a node of one IMU lie."""
-    paths = os.pathsep.join(path for path in sys.path if path)
-    done = run_program(
-        sys.executable, "-c", SMALLER, folder=Path.cwd(), environment={**os.environ, "PYTHONPATH": paths}
-    )
-    assert done.returncode == 0, done.stderr
-    node, settings, sizes = json.loads(done.stdout)
-    return layout_of(node, settings, sizes)
 
 
 @needs_gcc
