@@ -59,14 +59,14 @@ def learnt_curvature(found: Adjusted) -> LearntCurvature:
     at_collar = now.curvatures[0]
     free_at_collar = 2.0 - float(np.trace(found.covs[0, 2:, 2:])) / now.curvature_var
     known = HOLE_KNOWN_AS * before
-    whole, legs = settled(
+    whole, legs = agreed_variances(
         seen, free, known + float(at_collar @ at_collar), HOLE_KNOWN_AS + free_at_collar, now.curvature_var
     )
-    below, _ = settled(seen[1:], free[1:], known, HOLE_KNOWN_AS, now.curvature_below)
+    below, _ = agreed_variances(seen[1:], free[1:], known, HOLE_KNOWN_AS, now.curvature_below)
     return LearntCurvature(whole, legs, below)
 
 
-def settled(seen: Array, free: Array, known: float, known_as: float, whole: float) -> tuple[float, Array]:
+def agreed_variances(seen: Array, free: Array, known: float, known_as: float, whole: float) -> tuple[float, Array]:
     """Variance of a hole and of its legs (s,) that agree with each other.
 
     Parameters

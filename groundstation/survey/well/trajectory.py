@@ -169,11 +169,11 @@ class Trajectory:
         for before, md in itertools.pairwise(mds):
             if not 0.0 < md - before < math.inf:
                 raise SurveyError(f"trajectory: expected a depth beyond {before:g} m, got {md:g} m")
-        directions = [self._stations.directions[-1], *(direction for _, direction in stations)]
-        check_bends(self.method, mds, tangents_of(directions))
+        tangents = tangents_of([direction for _, direction in stations])
         known = len(self)
+        check_bends(self.method, mds, np.concatenate([self._stations.rows["tangent"][known - 1 : known], tangents]))
         self._stations.append_all(stations, depths)
-        self._stations.direct(range(known, len(self)))
+        self._stations.direct(range(known, len(self)), tangents)
         self._draw(known)
 
     def put(
@@ -240,8 +240,8 @@ class Trajectory:
     def _moments(self, begin: int, lengths: Array) -> Array:
         """Moments (n, 4) of the path over legs (n,), m, from the one below a place on."""
         found = self._wander.moments(lengths)
-        driven = self._driven[begin : begin + len(found)]
-        found[: len(driven), [0, 2]] *= driven[:, None]  # of itself, and of it with the curvature at its end
+        if len(driven := self._driven[begin : begin + len(found)]):
+            found[: len(driven), [0, 2]] *= driven[:, None]  # of itself, and of it with the curvature at its end
         return found
 
     @property
@@ -327,7 +327,7 @@ class Trajectory:
             follow_legs,  # reading alone needs no compiler
         )
 
-        lengths, more = np.diff(rows["md"]), np.empty((len(legs), 3, 3))
+        lengths, more = rows["md"][1:] - rows["md"][:-1], np.empty((len(legs), 3, 3))
         alongs, memories = rows["along"].copy(), rows["memory"].copy()
         kinks, path = rows["kinks"].copy(), rows["path"].copy()
         follow_legs(
