@@ -68,7 +68,7 @@ def test_positions_are_as_well_known_as_is_said(curvature: float) -> None:
 
 
 def test_holes_that_hardly_bend_are_known_better_for_it() -> None:
-    """As wellbore 1, and as the calmest: of those nothing but their own looks tells, and more are inside than is said."""
+    """As wellbore 1, and as the calmest, of which more are inside than is said."""
     squares = squares_of(replace(VERTICAL, curvature=0.14, freedom=math.inf)).mean() / 2.0
     assert LEAST - 0.1 < squares < MOST
     assert squares_of(replace(VERTICAL, curvature=0.03, freedom=math.inf)).mean() / 2.0 > 0.5
