@@ -19,6 +19,7 @@ from groundstation.config import GroundConfig
 from groundstation.service.alarms.verdict import judge_hole
 from groundstation.service.alarms.verdict_doubts import known_of
 from groundstation.service.alarms.verdict_words import VerdictDoubt, Word
+from groundstation.service.answers.adjustment_views import budget_of_toe
 from groundstation.service.answers.model import RigModel
 from groundstation.service.hole.examined_hole import UNSOLVED
 from groundstation.survey.adjustment.tube_biases import bias_of_tube
@@ -221,3 +222,24 @@ def test_north_is_in_every_position_as_it_turns_the_hole_about_the_vertical(tmp_
     exact = knowing(tmp_path / "exact", measurements, 5)
     more = drawn.covs[:, 1, 1] - exact.hole.trajectory.covs[:, 1, 1]
     np.testing.assert_allclose(more[1:], by_north[1:, 1], rtol=1e-3)
+
+
+def test_what_a_covariance_is_made_of_adds_up_to_it_at_every_station(tmp_path: Path) -> None:
+    """With what the collar's direction and the first leg undo of each other: it is a part of the path's."""
+    model = knowing(tmp_path, passes(6, lambda _stop, station: 1.0 + 0.3 * station), 6, **ALIGNED, play_std_deg=1e-4)
+    drawn, examined = model.hole.trajectory, model.hole.examined
+    assert examined is not None
+    across = np.diagonal(drawn.covs, axis1=1, axis2=2)[1:, :2]
+    undone = -np.diagonal(drawn.tied_covs, axis1=1, axis2=2)[1:, :2]
+    assert (undone > 0.03 * across).all()
+    by_source = {name: variances[1:, :2] for name, variances in model.hole.variances.items()}
+    assert all((variances >= 0.0).all() for variances in by_source.values())
+    np.testing.assert_allclose(sum(by_source.values()), across, rtol=1e-6)
+    assert (by_source["random"] < 0.5 * across).all()
+    at_toe = sum(one.variances for one in budget_of_toe(model, examined))
+    np.testing.assert_allclose(at_toe[:2], across[-1], rtol=0.02)
+    legs = np.diagonal(drawn.path_covs[-1])[:2]
+    of_path = sum(one.variances[:2] for one in budget_of_toe(model, examined) if one.source in ("path", "legs"))
+    assert (of_path > legs - undone[-1]).all()
+    items = {row["item"]: row["toe_cm"] for row in shown_on(model, "setup")["items"]}
+    assert items["path"] == pytest.approx(100.0 * math.sqrt(of_path.max()), rel=1e-3)

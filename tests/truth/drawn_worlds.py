@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -41,6 +42,7 @@ class Case:
     legs: tuple[float, ...] = (2.0,)
     collar: float = 0.5
     curvature: float = 0.15
+    freedom: float = math.inf
     told: float = 0.0
     same_tool_face: bool = False
     left_out: frozenset[int] = frozenset()
@@ -80,12 +82,20 @@ def stops_of(case: Case) -> list[tuple[int, int, int]]:
     return kept or found[:1]
 
 
+def sizes_of(case: Case) -> Array:
+    """Standard deviations (w, 1), rad/m, of the curvatures of the holes of a case."""
+    if math.isinf(case.freedom):
+        return np.full((case.worlds, 1), case.curvature * DEG)
+    drawn = np.random.default_rng([case.seed, 1]).chisquare(case.freedom, (case.worlds, 1))
+    return np.asarray(case.curvature * DEG * np.sqrt((case.freedom - 2.0) / drawn))
+
+
 def draw_worlds(case: Case) -> Worlds:
     """Draw worlds of a case."""
     rng = np.random.default_rng(case.seed)
     md = np.concatenate([[0.0], np.cumsum(np.resize(case.legs, case.stations))])
     collar = direction(case.inclination * DEG, case.azimuth * DEG)
-    holes = draw_holes(rng, case.worlds, md, collar, case.collar * DEG, case.curvature * DEG, LENGTH)
+    holes = draw_holes(rng, case.worlds, md, collar, case.collar * DEG, sizes_of(case), LENGTH)
     count = case.tubes
     joints = np.full(count, case.joint * DEG)
     joints[list(case.untold)] = np.pi / np.sqrt(3.0)

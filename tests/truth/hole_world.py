@@ -18,11 +18,12 @@ SUBSTEPS = 16  # of a leg
 
 @dataclass(frozen=True)
 class Holes:
-    """Truth of many holes: directions (w, s + 1, 3) and curvatures (w, s + 1, 2) at collar and stations."""
+    """Truth of many holes at collar and stations: directions and positions (w, s + 1, 3), curvatures (w, s + 1, 2)."""
 
     md: Array
     tangents: Array
     curvatures: Array
+    positions: Array
 
 
 @dataclass(frozen=True)
@@ -70,14 +71,18 @@ def draw_holes(
     md: Array,
     collar: Array,
     collar_std: float,
-    curvature_std: float,
+    curvature_std: float | Array,
     length: float,
 ) -> Holes:
-    """Holes whose curvature wanders and is forgotten over ``length`` (m); the collar leans off by its own error."""
+    """Holes whose curvature wanders and is forgotten over ``length`` (m); the collar leans off by its own error.
+
+    ``curvature_std`` is that of all of them, or (w, 1) of each.
+    """
     frame = frames_along(np.broadcast_to(collar, (worlds, 3)))
     frame = frame * Rotation.from_rotvec(np.pad(collar_std * rng.normal(size=(worlds, 2)), ((0, 0), (0, 1))))
     curved = curvature_std * rng.normal(size=(worlds, 2))
-    tangents, curvatures = [frame.apply(DOWN)], [curved]
+    tangents, curvatures, positions = [frame.apply(DOWN)], [curved], [np.zeros((worlds, 3))]
+    at = positions[0]
     for leg in np.diff(md):
         step = leg / SUBSTEPS
         kept = np.exp(-step / length)
@@ -85,11 +90,14 @@ def draw_holes(
             new = kept * curved + curvature_std * np.sqrt(1.0 - kept**2) * rng.normal(size=(worlds, 2))
             bend = 0.5 * step * (curved + new)
             # bending towards the frame's x is a turn about its y, towards y one about minus x
+            before = frame.apply(DOWN)
             frame = frame * Rotation.from_rotvec(np.stack([-bend[:, 1], bend[:, 0], np.zeros(worlds)], axis=1))
+            at = at + 0.5 * step * (before + frame.apply(DOWN))
             curved = new
         tangents.append(frame.apply(DOWN))
         curvatures.append(curved)
-    return Holes(md, np.stack(tangents, axis=1), np.stack(curvatures, axis=1))
+        positions.append(at)
+    return Holes(md, *(np.stack(part, axis=1) for part in (tangents, curvatures, positions)))
 
 
 def draw_tubes(

@@ -40,7 +40,7 @@ def collar_departure(found: Adjusted) -> CollarDeparture:
     """Departure of the collar as it was told, in the axes of the collar of an adjustment.
 
     What the first station says, direction and curvature, is compared with what the collar leads to down a leg that
-    bends as the hole does below it: were it taken to bend as sharply as it seems to, no collar would ever be wrong.
+    bends as the hole does on the whole: were it taken to bend as sharply as it seems to, no collar would ever be wrong.
     """
     bases, now = found.bases, found.now
     if len(now.tangents) < 2:
@@ -48,14 +48,14 @@ def collar_departure(found: Adjusted) -> CollarDeparture:
     go, rigid = leg_steps(found.path)
     told = bases[0] @ found.path.collar_cov @ bases[0].T + KNOWN * np.eye(2)
     by_leg = np.asarray(np.linalg.inv(rigid[0]), np.float64)
-    led_to, leads_to = (led_down(go[0], told, var) for var in (now.curvature_var, now.curvature_below))
+    led_to = led_down(go[0], told, now.curvature_var)
     known = np.asarray(np.linalg.inv(found.cov_at(1)), np.float64)
     ends = np.stack([now.tangents[0], found.path.collar, now.tangents[0], now.tangents[1]])
     to_told, _, to_station = bends_between(ends, bases[:1].repeat(4, axis=0))
     pulled = known @ np.concatenate([to_station - to_told, now.curvatures[1]])
     # the station without what it has from the collar, which leads to no bend and no curvature
     own = known - np.linalg.inv(led_to + now.leg_vars[0] * by_leg)
-    weight = np.linalg.inv(np.eye(STATE) + own @ (leads_to + now.curvature_below * by_leg))
+    weight = np.linalg.inv(np.eye(STATE) + own @ (led_to + now.curvature_var * by_leg))
     down = go[0][:, :2]
     free = down.T @ weight @ own @ down
     sizes, _, told, squares = best_sizes(-(down.T @ weight @ pulled)[None], free[None], free[None])

@@ -15,7 +15,7 @@ Using the t Distribution", JASA 84 (1989).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -33,51 +33,26 @@ TOGETHER = 4  # rounds
 LEAST = 1e-12  # rad^2/m^2
 
 
-class LearntCurvature(NamedTuple):
-    """Variances, rad^2/m^2: of the hole, by which each leg (s,) is driven, and of the hole by the legs below the first.
+def learnt_curvature(found: Adjusted) -> tuple[float, Array]:
+    """Variance (rad^2/m^2) of the curvature of the hole, and that by which each leg (s,) is driven.
 
-    The last says how the hole bends where the collar is to be judged, which would make a kink of the first leg.
+    It is a step of iteration, in which the two settle together for the departures as they stand.
     """
-
-    whole: float
-    legs: Array
-    below: float
-
-
-def learnt_curvature(found: Adjusted) -> LearntCurvature:
-    """How sharply the hole and each of its legs bend.
-
-    It is a step of iteration, in which the hole and its legs settle together for the departures as they stand.
-    """
-    before, now = found.path.curvature_std**2, found.now
-    if not len(now.leg_vars):
-        return LearntCurvature(before, now.leg_vars, before)
+    before, legs = found.path.curvature_std**2, found.now.leg_vars
+    if not len(legs):
+        return before, legs
     go, rigid = leg_steps(found.path)
-    off = path_departures(found.path, now, found.linear.bases, go)
+    off = path_departures(found.path, found.now, found.linear.bases, go)
     seen = np.einsum("ka,kab,kb->k", off, rigid, off)
-    free = off.shape[1] - np.einsum("kab,kba->k", rigid, departure_covs(found, go)) / now.leg_vars
-    at_collar = now.curvatures[0]
-    free_at_collar = 2.0 - float(np.trace(found.covs[0, 2:, 2:])) / now.curvature_var
-    known = HOLE_KNOWN_AS * before
-    whole, legs = agreed_variances(
-        seen, free, known + float(at_collar @ at_collar), HOLE_KNOWN_AS + free_at_collar, now.curvature_var
-    )
-    below, _ = agreed_variances(seen[1:], free[1:], known, HOLE_KNOWN_AS, now.curvature_below)
-    return LearntCurvature(whole, legs, below)
-
-
-def agreed_variances(seen: Array, free: Array, known: float, known_as: float, whole: float) -> tuple[float, Array]:
-    """Variance of a hole and of its legs (s,) that agree with each other.
-
-    Parameters
-    ----------
-    seen, free : (s,), squares of the departures of each leg in the information of a curvature of 1, of how many
-    known, known_as : squares and their number beside those of the legs
-    whole : to begin with
-    """
+    free = off.shape[1] - np.einsum("kab,kba->k", rigid, departure_covs(found, go)) / legs
+    at_collar = found.now.curvatures[0]
+    free_at_collar = 2.0 - float(np.trace(found.covs[0, 2:, 2:])) / found.now.curvature_var
+    known = HOLE_KNOWN_AS * before + float(at_collar @ at_collar)
+    known_as = HOLE_KNOWN_AS + free_at_collar + float(free.sum())
+    whole = found.now.curvature_var
     for _ in range(TOGETHER):
         legs = (LEG_KNOWN_AS * whole + seen) / (LEG_KNOWN_AS + free)
-        whole = (known + whole * float(np.sum(seen / legs))) / (known_as + float(free.sum()))
+        whole = (known + whole * float(np.sum(seen / legs))) / known_as
     return max(whole, LEAST), np.maximum(legs, LEAST)
 
 

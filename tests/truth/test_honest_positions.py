@@ -1,0 +1,84 @@
+"""Positions of adjusted holes against worlds whose holes differ in how sharply they bend, as they are said to."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from drawn_worlds import DEG, LENGTH, Case, Worlds, draw_worlds
+from scipy.spatial.transform import Rotation
+from scipy.stats import binom, chi2
+
+from groundstation.service.hole.adjusted_stations import learnt_wander
+from groundstation.service.hole.hole_adjustment import directions_of
+from groundstation.survey.adjustment.adjust import adjust_hole
+from groundstation.survey.adjustment.blunders import Examination
+from groundstation.survey.fusion.shared import SharedErrors
+from groundstation.survey.well.trajectory import Trajectory
+
+pytestmark = pytest.mark.slow
+
+Array = npt.NDArray[np.float64]
+WORLDS = 300
+STATED_DEG = 0.3  # deg/m, root of the mean of the variances of the curvatures of all holes
+FREEDOM = 2.0 + 1.0 / 3.0  # of the variance of one of them, as decision 84 says of holes
+LEAST, MOST = 0.8, 1.2  # mean square over its degrees of freedom, of which three hundred holes leave 0.94 to 1.06
+
+
+def drawn_hole(worlds: Worlds, world: int, north_std: float) -> Trajectory:
+    """A hole as a ground station draws it whose depths are exact."""
+    found = adjust_hole(worlds.looks(world), worlds.string, worlds.path)
+    collar, *below = directions_of(Examination(found), SharedErrors(), north_std)
+    drawn = Trajectory(collar=collar)
+    drawn.bend_as(*learnt_wander(found, LENGTH))
+    drawn.extend(list(zip(worlds.path.md[1:].tolist(), below, strict=True)))
+    return drawn
+
+
+def squares_of(case: Case, north_deg: float = 0.0) -> Array:
+    """Squares (w, s) of the positions' errors to north and east in standard deviations; north is off as it is said."""
+    drawn_worlds = draw_worlds(case)
+    worlds = replace(drawn_worlds, path=replace(drawn_worlds.path, curvature_std=STATED_DEG * DEG))
+    turns = north_deg * DEG * np.random.default_rng([case.seed, 2]).normal(size=case.worlds)
+    found = []
+    for world, turn in enumerate(turns.tolist()):
+        drawn = drawn_hole(worlds, world, north_deg * DEG)
+        true = Rotation.from_rotvec([0.0, 0.0, turn]).apply(worlds.holes.positions[world])
+        off = (drawn.positions - true)[1:, :2]
+        found.append(np.einsum("ka,kab,kb->k", off, np.linalg.inv(drawn.covs[1:, :2, :2]), off))
+    return np.array(found)
+
+
+def check_squares(squares: Array) -> None:
+    """Coverage of 95 % at every station, and the mean square over all."""
+    inside = (squares < chi2.ppf(0.95, 2)).sum(axis=0)
+    least, most = binom.ppf([1e-3, 1.0 - 1e-3], WORLDS, [0.93, 0.97])
+    assert (inside >= least).all()
+    assert (inside <= most).all()
+    assert LEAST < squares.mean() / 2.0 < MOST
+
+
+@pytest.mark.parametrize("curvature", [STATED_DEG, 4.0 * STATED_DEG])
+def test_positions_are_as_well_known_as_is_said(curvature: float) -> None:
+    """Of holes as they are said to be, and of a ground that bends them four times as sharply."""
+    check_squares(squares_of(replace(VERTICAL, curvature=curvature)))
+
+
+def test_holes_that_hardly_bend_are_known_better_for_it() -> None:
+    """As wellbore 1, and as the calmest, of which more are inside than is said."""
+    squares = squares_of(replace(VERTICAL, curvature=0.14, freedom=math.inf)).mean() / 2.0
+    assert LEAST - 0.1 < squares < MOST
+    assert squares_of(replace(VERTICAL, curvature=0.03, freedom=math.inf)).mean() / 2.0 > 0.5
+
+
+def test_north_is_in_every_position() -> None:
+    check_squares(squares_of(replace(VERTICAL, seed=14, inclination=30.0), north_deg=0.3))
+
+
+VERTICAL = Case(
+    seed=12, worlds=WORLDS, tubes=5, stations=8, make_ups=4, inclination=2.0, yaw=0.02, tilt=0.2, joint=0.03,
+    curvature=STATED_DEG, freedom=FREEDOM, collar=0.15,
+)  # fmt: skip
