@@ -249,6 +249,12 @@ EVENT_TABLE: Final[dict[Code, EventSpec]] = {
         Severity.ERROR,
         "gravity goes around against the gyroscope: x and y of the sensors are exchanged; the node exchanges them back",
     ),
+    Code.STRING_TURNED: EventSpec(
+        "string_turned",
+        Severity.WARNING,
+        "the string turned below a head at rest: it ran on, unwinds or creeps; the yaw's variance says so",
+        (("sigmas", float), ("turned_deg", float)),
+    ),
 }
 
 

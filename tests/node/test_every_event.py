@@ -140,9 +140,14 @@ CASES: dict[Code, Callable[[], Bench]] = {
     Code.BIAS_MOVED: lambda: known().cycles(20, FAST).cycles(20, spoil=warmed),
     Code.AIDING_DOUBTED: lambda: wobbling(known()),
     Code.ENCODER_REVERSED: lambda: known().cycles(4, FAST, aided=False).aid(rate=-FAST).cycles(1, aided=False),
+    Code.STRING_TURNED: lambda: known().cycles(20, FAST).cycles(30, spoil=crept),
     Code.AXES_EXCHANGED: lambda: known().cycles(40, FAST, spoil=exchanged),
     Code.ENCODER_STANDS: lambda: standing(standing(known().cycles(4, FAST))).cycles(1, aided=False),
 }
+
+
+def crept(w: Numbers, f: Numbers) -> tuple[Numbers, Numbers]:
+    return (w[0], w[1], w[2] + 0.05 * DEG), f
 
 
 def exchanged(w: Numbers, f: Numbers) -> tuple[Numbers, Numbers]:

@@ -67,3 +67,11 @@ def test_a_slip_that_is_rejected_five_times_in_a_row_is_met_once() -> None:
         aided.aid(math.radians(1.0), row)
     assert aided.off == 0.0
     assert int(aided.node["guard"]["same"]["seen"]) == 0
+
+
+def test_another_error_between_two_that_are_alike_begins_anew() -> None:
+    aided = Aided()
+    for degrees in (1.0, 1.0, 40.0, 1.0, 25.0, 1.0, 70.0, 1.0):
+        aided.aid(math.radians(degrees), 1)
+        aided.aid(0.0)
+    assert aided.off == 0.0

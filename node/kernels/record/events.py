@@ -70,6 +70,7 @@ class Code(enum.IntEnum):
     ENCODER_REVERSED = 37
     ENCODER_STANDS = 38
     AXES_EXCHANGED = 39
+    STRING_TURNED = 40
 
 
 @by_type(lambda like, count: count << TOLD_Q)

@@ -72,8 +72,6 @@ SWING: Final = np.dtype(
     [
         ("cycles", "i8"),  # whose rates bend, less those that do not
         ("excess", "f8"),  # rad^2, mean of what a bend makes of the yaw
-        ("inside", "i8"),  # aidings whose rate no cycle beside them has, less those of which one does
-        ("outside", "f8"),  # rad/s, mean of by how much
     ],
     align=True,
 )
@@ -108,9 +106,13 @@ MIRROR: Final = np.dtype(
 )
 CREEP: Final = np.dtype(
     [
+        ("waits", "i8"),  # 1: the cycle before was one of a rest, and is summed up if this one is
         ("cycles", "i8"),  # of this rest, over which turns are summed up
-        ("bias", "f8", (3,)),  # rad/s, when the string came to rest
-        ("bias_var", "f8", (3,)),  # (rad/s)^2, of it
+        ("bias", "f8", (3,)),  # rad/s, constant part of it, when the string came to rest
+        ("wander", "f8", (3,)),  # rad/s, part of it that wanders, then
+        ("bias_var", "f8", (3,)),  # (rad/s)^2, of both; 0: not known
+        ("decay", "f8"),  # of the part that wanders, what is left of it
+        ("decays", "f8"),  # sum of that over the cycles
         ("angle", "f8", (3,)),  # rad, by which the string has turned since, if it did
         ("across", "f8", (2,)),  # gravity across the axis, mean of the first cycles of the rest
         ("first", "f8"),  # rad, of the turn by the middle of those
@@ -398,7 +400,7 @@ def forget_session(nodes: Array) -> None:
     guard["rate"] = guard["sane_rate"] = guard["agreed_rate"] = guard["aiding_var"] = 0.0
     guard["rate_at"] = -np.inf
     guard["swing"] = np.zeros(1, SWING)
-    guard["creep"]["cycles"] = 0
+    guard["creep"]["cycles"] = guard["creep"]["waits"] = 0
     guard["jumped"] = guard["untimely"] = guard["agreed"] = guard["rest_cycles"] = 0
     nodes["twist"]["heard_at"] = -np.inf
     nodes["twist"]["torque"] = 0.0

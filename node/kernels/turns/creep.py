@@ -4,11 +4,12 @@ A string that runs on into its play, unwinds or creeps turns while the encoder s
 filter takes whatever its gyroscope shows for the bias, so the turn goes there. Here the rates of a rest are summed up
 beyond the bias of before it,
 
-    A = sum (w - b) T,    var A = t^2 (P_b + sigma_b^2 min(t / t_w, 1) + N^2 / t),
+    A = sum (w - b) T,    var A = t^2 (f^2 P_b + h sigma_b^2 + N^2 / t),
 
-with P_b the variance of the bias b as the string came to rest, what it wanders by after t (the mean over t of a
-Gauss-Markov bias is off by 2 t / 3 tau of its variance, t_w = 3 tau / 2), and the noise N. Where A is beyond that it is
-in doubt whether the string turned: its square is systematic variance of the yaw, until rests without it halve it.
+with P_b the variance of the bias b as the string came to rest, of which the part that wanders decays, and N the noise.
+Of a Gauss-Markov bias f = (1 - e^-x) / x, and h = 2 / x - (3 - 4 e^-x + e^-2x) / x^2 with x = t / tau, which is x / 2.1
+but for 0.04, at most 3/8. Where A is beyond that it is in doubt whether the string turned: its square is systematic
+variance of the yaw, of which the end of every rest leaves half.
 
 Two witnesses are asked. The *other axes*: a sensor that warms up, or feels another force, moves all its biases, a
 string none of those across. *Gravity*: of a tube that leans by I the tool face, the mean of eight samples against that
@@ -21,9 +22,10 @@ What is less than both noises is seen by neither: `docs/field.md` has the proof.
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
-from node.kernels.arithmetic.formats import ANGLE_Q, DEG, VECTOR_Q
+from node.kernels.arithmetic.formats import ANGLE_Q, DEG, PERIOD, VECTOR_Q
 from node.kernels.arithmetic.jit import kernel, kernel_constant
 from node.kernels.arithmetic.operations import (
     angular_root,
@@ -40,46 +42,50 @@ from node.kernels.arithmetic.operations import (
     turned_angle,
     vector_length,
 )
-from node.kernels.arithmetic.quantity import NONE, angle_quantity, factor_quantity, variance_quantity
+from node.kernels.arithmetic.quantity import (
+    NONE,
+    ONE,
+    angle_quantity,
+    factor_quantity,
+    rate_quantity,
+    variance_quantity,
+)
 from node.kernels.filter.modes import HELD, STATIC_BIAS
 from node.kernels.filter.priors import bias_var, noise_over
 from node.kernels.record.events import Code, event_degrees, event_number, queue_event
 from node.kernels.record.filter_record import RING, Err
 
 QUICK: Final = 8  # cycles of a rest, in which a string runs on, and of a mean of gravity
+FASTEST: Final = rate_quantity(DEG)  # rad/s, of a string that creeps; one that is faster is turned
 LONGEST: Final = 600  # cycles of a rest, over which turns are summed up
-WANDERS: Final = 46  # cycles after which a bias may be off by all that it wanders, 3/2 of its time constant
-LIKELY: Final = 5  # half sigmas of a turn that a string is known to make, right after a stop
-UNLIKELY: Final = 6  # half sigmas of any other, which is looked for as long as the rest lasts
+DECAY: Final = factor_quantity(math.exp(-PERIOD / 15.87))  # of the part of a bias that wanders, in a cycle
+WANDERS: Final = 64  # cycles, in units of which h is the time: 2.1 time constants
+WANDERED: Final = 24  # cycles, after which it grows no more
+LIKELY: Final = 6  # half sigmas of a turn that a string is known to make, right after a stop
+UNLIKELY: Final = 7  # half sigmas of any other, which is looked for as long as the rest lasts
 BEYOND: Final = 3  # sigmas, of what is not noise
 SURE: Final = 4  # sigmas, of a turn that gravity alone shows
 LEAST_LEAN: Final = factor_quantity(0.5 * DEG)  # sine of the lean, from where there is a tool face
-LEAST_SQUARE: Final = factor_quantity((0.5 * DEG) ** 2)
-UNSEEN: Final = factor_quantity(1.9)  # rad, standard deviation of a tool face that is none
+LEAST_SQUARE: Final = factor_quantity((0.5 * DEG) ** 2)  # its square
+UNSEEN: Final = factor_quantity(1.9)  # rad, standard deviation of a tool face that tells nothing
 LEAST_DOUBT: Final = variance_quantity((0.002 * DEG) ** 2)  # rad^2, below which a doubt counts as zero
-RADIAN: Final = angle_quantity(1.0)
+RADIAN: Final = angle_quantity(1.0)  # the unit
 BX = kernel_constant(Err.BIAS_X)
-AIDING_DOUBTED = kernel_constant(Code.AIDING_DOUBTED)
+STRING_TURNED = kernel_constant(Code.STRING_TURNED)
 
 
 @kernel
 def follow_creep(node: Any, settings: Any) -> None:
-    """Take the cycle in that the filter has just had; see the module."""
+    """Take the cycle in before the one that the filter has just had, in which the head may have started."""
     state, creep = node.filter, node.guard.creep
     if not is_resting(node):
         end_rest(creep)
         remember_biases(state, creep)
         return
-    newest = (state.cycles - 1) % RING
-    period = state.ring_end[newest] - state.ring_start[newest]
-    creep.cycles = min(creep.cycles + 1, LONGEST)
-    for k in range(3):
-        creep.angle[k] += turned_angle(state.ring_rate[newest, k] - creep.bias[k], period)
-    if creep.cycles == QUICK // 2:
-        creep.first = creep.angle[2]
-    if creep.cycles == QUICK:
-        for k in range(2):
-            creep.across[k] = bounded_ratio(mean_force(state, k), node.config.gravity)
+    if creep.waits == 0:
+        creep.waits = 1
+        return
+    take_cycle(node, (state.cycles - 2) % RING)
     if has_sensor_moved(node):
         withdraw_doubt(node)
     elif 1 < creep.cycles < LONGEST:
@@ -87,37 +93,63 @@ def follow_creep(node: Any, settings: Any) -> None:
 
 
 @kernel
+def take_cycle(node: Any, slot: int) -> None:
+    """Sum up what the cycle in a slot of the ring has turned by, and keep gravity's first mean."""
+    state, creep = node.filter, node.guard.creep
+    period = state.ring_end[slot] - state.ring_start[slot]
+    creep.cycles = min(creep.cycles + 1, LONGEST)
+    creep.decay = times_factor(creep.decay, DECAY)
+    creep.decays += creep.decay
+    for k in range(3):
+        creep.angle[k] += turned_angle(state.ring_rate[slot, k] - expected_bias(creep, k), period)
+    if creep.cycles == QUICK // 2:
+        creep.first = creep.angle[2]
+    if creep.cycles == QUICK:
+        for k in range(2):
+            creep.across[k] = bounded_ratio(mean_force(state, k), node.config.gravity)
+
+
+@kernel
 def is_resting(node: Any) -> bool:
     """Whether the encoder reports a head at rest to a string that hangs on it, whose bias is known."""
     state, guard = node.filter, node.guard
     is_held = state.mode in (STATIC_BIAS, HELD)
-    return bool(guard.rest_cycles > 0 and state.cycles > 0 and not is_held and guard.gyro.fault == 0)
+    is_known = guard.creep.bias_var[2] > 0
+    is_slow = state.cycles > 1 and abs(state.now_rate) < FASTEST
+    return bool(guard.rest_cycles > 0 and is_known and is_slow and not is_held and guard.gyro.fault == 0)
 
 
 @kernel
 def remember_biases(state: Any, creep: Any) -> None:
     """Keep each bias and its variance, as the filter has them before a rest."""
     for k in range(3):
-        creep.bias[k] = state.static_bias[k] + state.bias[k]
-        creep.bias_var[k] = state.P[BX + k, BX + k]
+        creep.bias[k], creep.wander[k] = state.static_bias[k], state.bias[k]
+        creep.bias_var[k] = state.P[BX + k, BX + k] if state.mode != STATIC_BIAS else 0
         creep.angle[k] = 0
+    creep.decay, creep.decays = ONE, 0
+
+
+@kernel
+def expected_bias(creep: Any, k: int) -> float:
+    """Bias (rad/s) about axis ``k`` that the one of before the rest has become."""
+    return as_number(creep.bias[k] + times_factor(creep.wander[k], creep.decay))
 
 
 @kernel
 def end_rest(creep: Any) -> None:
-    """A rest that was looked at is over: one without a turn halves what is in doubt."""
-    if creep.cycles > 2 * QUICK and creep.doubted == 0:
+    """A rest that was looked at is over: a head that turns takes the string along again, and half is left in doubt."""
+    if creep.cycles > 2 * QUICK:
         creep.doubt = half_of(creep.doubt) if creep.doubt > LEAST_DOUBT else 0
-    creep.cycles, creep.doubted = 0, 0
+    creep.cycles, creep.doubted, creep.waits = 0, 0, 0
     creep.standing = creep.doubt
 
 
 @kernel
 def mean_force(state: Any, k: int) -> float:
-    """Mean (m/s^2) of the last ``QUICK`` forces along axis ``k``."""
+    """Mean (m/s^2) of the last ``QUICK`` forces along axis ``k``, but for the newest."""
     total: float = 0
     for n in range(QUICK):
-        total += state.ring_force[(state.cycles - 1 - n) % RING, k]
+        total += state.ring_force[(state.cycles - 2 - n) % RING, k]
     return mean_of_total(total, QUICK)
 
 
@@ -126,8 +158,10 @@ def turn_std(node: Any, k: int) -> float:
     """Standard deviation (rad) of the angle summed up about axis ``k``, of a string that did not turn."""
     config, creep = node.config, node.guard.creep
     time = time_of_cycles(node.filter.now, creep.cycles)
-    wander = mean_of_total(bias_var(config, k), WANDERS) * min(creep.cycles, WANDERS)
-    var = bounded_variance(creep.bias_var[k] + wander + noise_over(config, k, 1, time))
+    f = mean_of_total(creep.decays, creep.cycles)
+    known = times_factor(creep.bias_var[k], times_factor(f, f))
+    wander = mean_of_total(bias_var(config, k), WANDERS) * min(creep.cycles, WANDERED)
+    var = bounded_variance(known + wander + noise_over(config, k, 1, time))
     return turned_angle(angular_root(var), time)
 
 
@@ -163,7 +197,7 @@ def judge_turn(node: Any, settings: Any) -> None:
     if creep.doubted == 1 and creep.cycles >= 2 * QUICK:
         creep.doubted = 2
         sigmas = event_number(quantity_ratio(angle, std), VECTOR_Q)
-        queue_event(node, AIDING_DOUBTED, sigmas, event_degrees(angle, ANGLE_Q), NONE, NONE)
+        queue_event(node, STRING_TURNED, sigmas, event_degrees(angle, ANGLE_Q), NONE, NONE)
 
 
 @kernel
@@ -171,9 +205,10 @@ def turn_between(node: Any) -> float:
     """Turn (rad) that the gyroscope shows from the middle of gravity's first mean to the middle of its last."""
     state, creep = node.filter, node.guard.creep
     since: float = 0
+    bias = expected_bias(creep, 2)
     for n in range(QUICK // 2):
-        slot = (state.cycles - 1 - n) % RING
-        since += turned_angle(state.ring_rate[slot, 2] - creep.bias[2], state.ring_end[slot] - state.ring_start[slot])
+        slot = (state.cycles - 2 - n) % RING
+        since += turned_angle(state.ring_rate[slot, 2] - bias, state.ring_end[slot] - state.ring_start[slot])
     return as_number(creep.angle[2] - creep.first - since)
 
 
