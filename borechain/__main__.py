@@ -17,6 +17,7 @@ COMMANDS = {
     "scenario": ("borechain.cli.scenario.scenario_command", "group", "List and show the scenarios of the program."),
     "node": ("node.process.tube_command", "node", "Run the node of one tube."),
     "encoder": ("node.process.encoder_command", "encoder", "Run the encoder node on the drive head."),
+    "board": ("node.process.board_command", "board", "Check the board that this runs on."),
     "medium": ("borechain.cli.rig.medium", "medium", "Run world, joints and clock of a scenario."),
     "ground": ("groundstation.command", "ground", "Run the ground station."),
     "router": (

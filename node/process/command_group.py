@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from node.process.board_command import board
 from node.process.encoder_command import encoder
 from node.process.tube_command import node
 
@@ -39,5 +40,6 @@ def commands() -> None:
     """
 
 
+commands.add_command(board)
 commands.add_command(node)
 commands.add_command(encoder)

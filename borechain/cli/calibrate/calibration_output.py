@@ -18,6 +18,7 @@ from borechain.cli.console_tables import table_console
 from borechain.cli.faults import EnvironmentFault, InputFault
 from borechain.cli.shared_options import json_option
 from borechain.cli.whole_files import PLOT_FORMATS, check_suffix
+from groundstation.report.calibrations.calibration_request import UNITS
 from telemetry.runtime.command_line import check_installed
 
 if TYPE_CHECKING:
@@ -47,6 +48,10 @@ output_options = (
     click.option("--due", type=click.DateTime(["%Y-%m-%d"]), help="Day of the next calibration, for the certificate."),
     json_option,
 )  # of WantedFiles
+landing_options = (full_scale_option, force_option, *output_options)  # of a calibration that gates may refuse
+unit_option = click.option(
+    "--unit", type=click.Choice(list(UNITS)), default="deg/s", show_default=True, help="Unit of FILE."
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,12 +10,11 @@ from borechain.cli.calibrate.calibration_output import (
     WantedFiles,
     deliver_calibration,
     file_argument,
-    force_option,
-    full_scale_option,
-    output_options,
+    landing_options,
+    unit_option,
 )
 from borechain.cli.faults import plain_faults
-from groundstation.report.calibrations.calibration_request import UNITS, AttitudesRequest, TurntableRequest
+from groundstation.report.calibrations.calibration_request import AttitudesRequest, TurntableRequest
 from telemetry.runtime.typed_options import gather_options
 
 jig_option = click.option(
@@ -37,12 +36,10 @@ temperature_option = click.option("--temperature-c", type=float, help="Temperatu
         required=True,
         help="True rate or specific force of the first column of each pair, in the unit of FILE.",
     ),
-    click.option("--unit", type=click.Choice(list(UNITS)), default="deg/s", show_default=True, help="Unit of FILE."),
+    unit_option,
     jig_option,
     temperature_option,
-    full_scale_option,
-    force_option,
-    *output_options,
+    *landing_options,
     wanted=WantedFiles,
     request=TurntableRequest,
 )
@@ -70,9 +67,7 @@ def turntable(request: TurntableRequest, wanted: WantedFiles) -> None:
     ),
     jig_option,
     temperature_option,
-    full_scale_option,
-    force_option,
-    *output_options,
+    *landing_options,
     wanted=WantedFiles,
     request=AttitudesRequest,
 )

@@ -10,8 +10,8 @@ from borechain.cli.calibrate.calibration_output import (
     WantedFiles,
     deliver_calibration,
     file_argument,
-    force_option,
     full_scale_option,
+    landing_options,
     output_options,
 )
 from borechain.cli.calibrate.linear import jig_option
@@ -39,9 +39,7 @@ accelerometers_option = click.option(
         "--tool-face", is_flag=True, help="Align the solution with the jig's tool faces; otherwise m_AB = m_BA."
     ),
     jig_option,
-    full_scale_option,
-    force_option,
-    *output_options,
+    *landing_options,
     wanted=WantedFiles,
     request=MwdRequest,
 )
@@ -70,9 +68,7 @@ def mwd(request: MwdRequest, wanted: WantedFiles) -> None:
         help="Strength of the site's magnetic field, uT.",
     ),
     click.option("--dip-deg", type=click.FloatRange(-90.0, 90.0), help="Dip of the site's field below the horizontal."),
-    full_scale_option,
-    force_option,
-    *output_options,
+    *landing_options,
     wanted=WantedFiles,
     request=MagnetometerRequest,
 )

@@ -8,28 +8,25 @@ from borechain.cli.calibrate.calibration_output import (
     WantedFiles,
     deliver_calibration,
     file_argument,
-    force_option,
-    full_scale_option,
-    output_options,
+    landing_options,
+    unit_option,
 )
 from borechain.cli.faults import plain_faults
-from groundstation.report.calibrations.calibration_request import UNITS, TemperatureRequest
+from groundstation.report.calibrations.calibration_request import TemperatureRequest
 from telemetry.runtime.typed_options import gather_options
 
 
 @click.command()
 @gather_options(
     file_argument,
-    click.option("--unit", type=click.Choice(list(UNITS)), default="deg/s", show_default=True, help="Unit of FILE."),
+    unit_option,
     click.option(
         "--bias-degree", type=click.IntRange(0, 3), default=2, show_default=True, help="Highest power of the bias."
     ),
     click.option(
         "--matrix-degree", type=click.IntRange(0, 3), default=1, show_default=True, help="Highest power of the matrix."
     ),
-    full_scale_option,
-    force_option,
-    *output_options,
+    *landing_options,
     wanted=WantedFiles,
     request=TemperatureRequest,
 )

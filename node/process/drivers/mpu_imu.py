@@ -127,6 +127,16 @@ class MpuImu:
         self._fresh = True  # nothing was read since the start: the FIFO need not hold one cycle
         self._starts = 0
 
+    @property
+    def description(self) -> str:
+        """The chip, where it is, and how it is set."""
+        return f"{self._chip.name} at 0x{self._address:02x}, {self.sample_rate:.1f} Hz"
+
+    @property
+    def counted_rate(self) -> float:
+        """Rate of the frames, Hz, as counted so far."""
+        return 1.0 / self._frames.period
+
     def start(self) -> None:
         """Reset, identify, configure, read the configuration back and empty the FIFO."""
         chip = self._chip

@@ -1,0 +1,201 @@
+"""``borechain board check`` on an emulated board: every line good, then each fault named, one at a time."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import math
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from emulated_encoders import EmulatedCounter
+from emulated_mpu import EmulatedMpu
+
+from borechain.pki.rig_keys import add_tube, init_rig
+from node.process import board_places
+from node.process.board_command import board
+from node.process.board_sensors import check_encoder, check_imu
+from node.process.drivers.mpu_imu import MpuImu
+from node.process.drivers.quadrature import QuadratureFile
+
+NOW = datetime.datetime(2026, 11, 27, 7, 0, tzinfo=datetime.UTC)
+GOOD_CAN = {
+    "ifname": "can0",
+    "flags": ["NOARP", "UP", "LOWER_UP", "ECHO"],
+    "link_type": "can",
+    "linkinfo": {
+        "info_kind": "can",
+        "info_data": {
+            "ctrlmode": ["FD"],
+            "state": "ERROR-ACTIVE",
+            "berr_counter": {"tx": 0, "rx": 3},
+            "bittiming": {"bitrate": 500000},
+            "data_bittiming": {"bitrate": 2000000},
+        },
+    },
+}
+
+
+class Board:
+    """A board whose parts are emulated; time is that of its sensor."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.folder, self.now, self.turn = folder, 100.0, 90.0
+        self.chip = EmulatedMpu()
+        self.driver = MpuImu(self.chip.connect, sleep=lambda _: None)
+        self.counter = EmulatedCounter(folder / "counters")
+        self.random = np.random.default_rng(3)
+        self.bias, self.force, self.noise, self.temperature = (
+            np.radians([0.5, -1.0, 0.2]),
+            1.0,
+            math.radians(0.05),
+            31.0,
+        )
+        self.quicker, self.step, self.stops_at = 1.0, 1, 10**9
+        self.can = json.loads(json.dumps(GOOD_CAN))
+        self.clock = NOW
+        self.keys = folder / "stick"
+        init_rig(self.keys, "rig-1", NOW)
+        add_tube(self.keys, 7, NOW)
+        add_tube(self.keys, 8, NOW)
+        self.key_place = self.keys / "tube-7.keys"
+        self.kernels = folder / "kernels"
+        (self.kernels / "node.kernels.step.node_step").mkdir(parents=True)
+        self.index = self.kernels / "node.kernels.step.node_step" / "node_step.node_step-9.py311.nbi"
+        self.index.touch()
+        self.programs = folder / "bin"
+        self.programs.mkdir()
+        monkeypatch.setenv("PATH", str(self.programs), prepend=":")
+
+    def sleep(self, seconds: float) -> None:
+        """Let the sensor live."""
+        self.now += seconds
+        for _ in range(26):
+            noise = self.random.normal(0.0, 1.0, 3)
+            rate = self.bias + self.noise * noise
+            force = self.force * (np.array([0.2, -0.3, -9.79]) + 15.0 * self.noise * noise)
+            self.chip.live(seconds * self.quicker / 26.0, tuple(rate), tuple(force), self.temperature)
+
+    def turn_head(self) -> None:
+        self.counter.turn_to(min(self.step * round(self.turn * 4096 / 360.0), self.stops_at))
+
+    def findings(self) -> dict[str, tuple[bool, str]]:
+        program = self.programs / "ip"
+        program.write_text(f"#!/bin/sh\ncat <<'END'\n{json.dumps([self.can] if self.can else [])}\nEND\n")
+        program.chmod(0o755)
+        lines = check_imu(self.driver, clock=lambda: self.now, sleep=self.sleep)
+        lines += check_encoder(QuadratureFile(self.counter.place / "count"), 90.0, lambda: self.now, self.turn_head)
+        lines += [board_places.check_can("can", "can0"), board_places.check_clock(self.clock)]
+        lines += [
+            board_places.check_disk(self.folder / "state"),
+            board_places.check_keys(self.key_place, 7, self.clock),
+        ]
+        lines += [board_places.check_kernels(self.kernels)]
+        return {line.part: (line.good, line.text) for line in lines}
+
+
+@pytest.fixture
+def emulated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Board:
+    return Board(tmp_path, monkeypatch)
+
+
+PARTS = {
+    "sensor", "readings", "rate", "noise", "bias", "gravity", "ranges", "temperature",
+    "encoder", "direction", "count", "can", "clock", "disk", "keys", "kernels",
+}  # fmt: skip
+
+
+def test_every_line_of_a_good_board_is_good(emulated: Board) -> None:
+    found = emulated.findings()
+    assert set(found) == PARTS
+    assert {part: text for part, (good, text) in found.items() if not good} == {}
+    assert found["sensor"][1] == "mpu6500 at 0x68, 50.0 Hz"
+    assert found["can"][1] == "can0: FD, 500000 bit/s"
+
+
+def can_with(**data: object) -> Callable[[Board], object]:
+    return lambda one: one.can["linkinfo"]["info_data"].update(data)
+
+
+FAULTS: list[tuple[str, Callable[[Board], object], str, str]] = [
+    ("no sensor", lambda one: setattr(one.chip, "absent", True), "sensor", "No such device"),
+    ("another chip", lambda one: setattr(one.chip, "identity", 0x68), "sensor", "which is an mpu6050"),
+    ("a deaf register", lambda one: one.chip.deaf.add(0x1C), "sensor", "register 0x1c: expected 0x10"),
+    ("bytes lost", lambda one: setattr(one.chip, "lose_in", (20, 6)), "readings", "1 of 8 cycles lost"),
+    ("a crystal 15 % off", lambda one: setattr(one, "quicker", 1.15), "rate", "set to 50.0"),
+    ("a sensor that moves", lambda one: setattr(one, "noise", math.radians(5.0)), "noise", "expected at most 0.150"),
+    ("readings that repeat", lambda one: setattr(one, "noise", 0.0), "noise", "repeats itself"),
+    ("a large bias", lambda one: one.bias.__setitem__(1, math.radians(30.0)), "bias", "expected at most 20"),
+    ("half the force", lambda one: setattr(one, "force", 0.5), "gravity", "expected 9.81 within 15 %"),
+    ("a rate at its range", lambda one: one.bias.__setitem__(0, 9.0), "ranges", "gyroscope at its range"),
+    ("no thermometer", lambda one: setattr(one, "temperature", -300.0), "temperature", "expected -45..125"),
+    ("no encoder", lambda one: one.counter.unplug(), "encoder", "No such file"),
+    ("lines exchanged", lambda one: setattr(one, "step", -1), "direction", "counts backwards"),
+    ("another resolution", lambda one: setattr(one, "turn", 45.0), "count", "45.00 deg for a turn of 90"),
+    ("a counter that stands", lambda one: setattr(one.counter, "stands", True), "count", "0.00 deg"),
+    ("no CAN interface", lambda one: one.can.clear(), "can", "is its overlay loaded?"),
+    ("CAN is down", lambda one: one.can["flags"].remove("UP"), "can", "it is down"),
+    ("bus off", can_with(state="BUS-OFF"), "can", "expected state ERROR-ACTIVE, got BUS-OFF"),
+    ("another bit rate", can_with(bittiming={"bitrate": 250000}), "can", "expected 500000 bit/s, got 250000"),
+    ("a classic controller", can_with(ctrlmode=[]), "can", "expected CAN FD, got classic"),
+    ("another data rate", can_with(data_bittiming={"bitrate": 1000000}), "can", "for data, got 1000000"),
+    ("many errors", can_with(berr_counter={"tx": 120, "rx": 0}), "can", "expected at most 95 errors"),
+    (
+        "a clock of 1970",
+        lambda one: setattr(one, "clock", NOW.replace(year=1971)),
+        "clock",
+        "expected a clock that was set",
+    ),
+    ("a disk that takes no file", lambda one: (one.folder / "state").write_text(""), "disk", "File exists"),
+    ("keys of another tube", lambda one: shutil.copy(one.keys / "tube-8.keys", one.key_place), "keys", "of tube-8"),
+    ("keys open to others", lambda one: one.key_place.chmod(0o644), "keys", "expected permissions 0600, got 0644"),
+    ("no keys", lambda one: one.key_place.unlink(), "keys", "No such file"),
+    ("no compiled kernels", lambda one: one.index.unlink(), "kernels", "not compiled in"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "break_it", "part", "says"), FAULTS, ids=[row[0] for row in FAULTS])
+def test_each_fault_is_named_in_the_line_of_its_part(
+    emulated: Board, name: str, break_it: Callable[[Board], object], part: str, says: str
+) -> None:
+    break_it(emulated)
+    found = emulated.findings()
+    good, text = found[part]
+    assert not good, name
+    assert says in text
+    wrong = {other for other, (fine, _) in found.items() if not fine}
+    also = {
+        "a clock of 1970": {"keys"},
+        "a rate at its range": {"noise", "bias"},  # it repeats itself there
+    }
+    assert wrong - {part} <= also.get(name, set())
+
+
+def test_keys_that_end_soon_are_named(emulated: Board) -> None:
+    text = emulated.key_place.read_text()
+    made = f"made_at = {NOW.isoformat()}"
+    assert made in text
+    emulated.key_place.write_text(text.replace(made, f"{made}\nretires_at = {NOW.replace(month=12).isoformat()}", 1))
+    assert emulated.findings()["keys"][0]
+    emulated.clock = NOW.replace(month=12, day=20)
+    assert emulated.findings()["keys"] == (False, "generation 1 holds until 2026-12-27 07:00 UTC")
+
+
+def test_the_command_prints_a_line_a_part_and_ends_by_what_it_found(tmp_path: Path) -> None:
+    rows = np.column_stack([0.5 * np.arange(60), np.random.default_rng(1).normal(0.0, 1e-4, (60, 6))])
+    rows[:, 6] -= 9.8
+    np.save(tmp_path / "imu.npy", rows)
+    words = ["check", "--imu", f"replay:{tmp_path / 'imu.npy'}", "--folder", str(tmp_path / "state")]
+    done = CliRunner().invoke(board, [*words, "--json"])
+    found = json.loads(done.stdout)
+    assert {row["part"] for row in found["findings"]} >= {"sensor", "readings", "gravity", "clock", "disk", "kernels"}
+    assert done.exit_code == (0 if found["good"] else 1)
+    done = CliRunner().invoke(board, [*words, "--can", "no-such-interface"])
+    assert done.exit_code == 1
+    assert "WRONG  can no-such-interface" in done.stdout
+    assert CliRunner().invoke(board, ["check", "--imu", "bmp280:1"]).exit_code == 2
