@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from telemetry import keys
 from telemetry.errors import BorechainError, InputError, MediumError
 
 if TYPE_CHECKING:
@@ -293,16 +292,18 @@ def replay(recording: Recording, folder: Path) -> dict[str, Any]:
     return known | {"digest": station_digest(known["stations"])}
 
 
-def query(selector: str, endpoint: str = keys.DEFAULT_ENDPOINT, timeout: float = 5.0) -> dict[str, Any]:
-    """What a running ground station answers to ``selector`` (docs/keys.md), by key.
+def query(selector: str, endpoint: str | None = None, timeout: float = 5.0) -> dict[str, Any]:
+    """What a running ground station answers to ``selector`` (docs/keys.md), by key; on this machine by default.
 
     Raises
     ------
     MediumError
         When no answer comes within ``timeout`` (s), or the ground station refuses.
     """
+    from telemetry import keys  # walls and surveys do without its messages
     from telemetry.media.zenoh_bus import open_client
 
+    endpoint = endpoint or keys.DEFAULT_ENDPOINT
     with open_client(endpoint, timeout) as bus:
         replies = bus.get(selector, timeout)
     answers = {reply.key: json.loads(reply.payload) for reply in replies if reply.error is None}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from groundstation.entry.null_values import null_or_number
+from groundstation.entry.null_values import BEYOND, NEVER, null_or_number
 from groundstation.errors import SurveyError
 
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
@@ -61,7 +62,9 @@ def cell_numbers(path: Path, lines: Sequence[int], name: str, cells: Sequence[st
     SurveyError
         Names line and column of the first cell that is neither.
     """
-    found = []
+    if decimal == "." and (plain := _plain_numbers(cells)) is not None:
+        return plain
+    found: list[float | None] = []
     for number, cell in zip(lines, cells, strict=True):
         text = plain_cell(cell, decimal)
         try:
@@ -74,3 +77,16 @@ def cell_numbers(path: Path, lines: Sequence[int], name: str, cells: Sequence[st
                 ) from None
             raise SurveyError(f"{where}: expected numbers, got {name} = {cell!r}") from None
     return found
+
+
+def _plain_numbers(cells: Sequence[str]) -> list[float | None] | None:
+    """Numbers of a column that holds nothing else, in half the time; None where each cell is to be looked at."""
+    if "_" in "".join(cells):  # Python would read 1_0 as ten
+        return None
+    try:
+        values = [*map(float, cells)]
+    except ValueError:
+        return None
+    sizes = [*map(abs, values)]
+    are_all = math.isfinite(sum(sizes)) and max(sizes, default=0.0) <= BEYOND and NEVER.isdisjoint(values)
+    return [*values] if are_all else None

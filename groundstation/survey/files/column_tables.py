@@ -55,7 +55,9 @@ def read_table_columns(
     for place, (name, scale) in enumerate(scales):
         cells = [row[place] for row in table.rows]
         if name in texts:
-            found[name] = np.array([plain_cell(cell, decimal) if _is_number(cell, decimal) else cell for cell in cells])
+            if decimal != ".":
+                cells = [plain_cell(cell, decimal) if _is_number(cell, decimal) else cell for cell in cells]
+            found[name] = np.array(cells)
             continue
         try:
             values = cell_numbers(path, table.lines, table.header[place], cells, decimal)
@@ -63,8 +65,8 @@ def read_table_columns(
             if name in names:
                 raise
             continue
-        for line, value in zip(table.lines, values, strict=True):
-            if name in OWN.values() and value is not None and not math.isfinite(value):
+        for line, value in zip(table.lines, values, strict=True) if name in OWN.values() else ():
+            if value is not None and not math.isfinite(value):
                 raise SurveyError(f"{path}: line {line}: expected a finite {name}, got {value}")
         found[name] = scale * np.array([_value(name, value) for value in values])
     return found, table.lines

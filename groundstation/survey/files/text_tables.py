@@ -63,6 +63,8 @@ def split_cells(line: str, separator: str) -> list[str]:
         return re.split(r"\s{2,}|\t", line.strip())
     if separator == " ":
         return line.split()
+    if line and '"' not in line:
+        return [cell.strip() for cell in line.split(separator)]
     try:
         return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, strict=True))]
     except (csv.Error, StopIteration):

@@ -17,7 +17,7 @@ from groundstation.survey.adjustment.sphere import carried_bases
 
 Array = npt.NDArray[np.float64]
 DEG = math.pi / 180.0
-G = 9.79
+G, GRAVITY_STD = 9.79, 1e-3  # m/s^2
 NOISE, PLAY, TURN_STD = 5e-4, 0.008 * DEG, 0.05 * DEG
 TUBES, LENGTH = 5, 3.0
 CURVATURE, MEMORY = 0.4 * DEG, 30.0  # rad/m, m
@@ -48,11 +48,12 @@ def drawn_hole(
     table = np.array(rows)
     station, tube, stop = (np.ascontiguousarray(column.astype(np.intp)) for column in table.T[:3])
     known = np.full(len(table), NOISE**2)
-    forces, yaws = np.ascontiguousarray(table[:, 3:6]), table[:, 6].copy()
+    gravity = G + GRAVITY_STD * random.standard_normal()  # of the site, which is known no better than its prior says
+    forces, yaws = np.ascontiguousarray(table[:, 3:6]) * (gravity / G), table[:, 6].copy()
     looks = Looks(station, tube, np.zeros_like(tube), stop, forces, known, yaws, np.full(len(table), yaw_std**2))
     string = StringPrior(
         np.full(TUBES, 0.01), np.full(TUBES, 1e-6), np.zeros(TUBES + 1), np.diag([TURN_STD**2] * TUBES + [1e-12]), G,
-        1e-3, PLAY,
+        GRAVITY_STD, PLAY,
     )  # fmt: skip
     across = np.eye(3) - np.outer(told, told)
     md = LENGTH * np.arange(TUBES + 1)
