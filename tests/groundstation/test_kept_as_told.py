@@ -34,6 +34,7 @@ from groundstation.service.setup.setup_book import SetupBook
 from groundstation.service.setup.told_value import SetupKind, ToldValue
 from groundstation.service.string.depth import DepthDoubt
 from groundstation.service.string.known_string import KnownString
+from groundstation.survey.fusion.joint_angles import JointAngle
 from telemetry.errors import MediumError
 from telemetry.messages import DepthReading, Stand
 from telemetry.transport.key_ring import Generation, KeyRing, keys_of, pack_ring, read_ring
@@ -156,6 +157,60 @@ def test_a_stand_that_another_follows_at_once_is_kept_with_its_end(store: Refusi
     string.depths.stands = [Stand(1, 100.0, 150.0, 4.0), Stand(1, 160.0, 165.0, 5.0)]
     keeper.keep_stand(reading(3, 165.0, 5.0))
     assert store.stands() == string.depths.stands
+
+
+def test_angles_of_joints_and_progress_are_the_newest_that_were_kept(tmp_path: Path) -> None:
+    for angles in (
+        {(3, 2): JointAngle(0.7, 1e-6), (2, 1): JointAngle(-1.2, 4e-6)},
+        {(2, 1): JointAngle(0.1, 9e-6)},
+        {},
+    ):
+        for text in ("one", "another"):
+            with contextlib.closing(Store(url(tmp_path))) as store:
+                store.keep_joints(angles)
+                store.keep_progress(text)
+            with contextlib.closing(Store(url(tmp_path))) as store:
+                assert store.joints() == angles
+                assert store.progress() == text
+
+
+@pytest.mark.parametrize(
+    ("epoch", "begun_at", "ended_at", "md", "is_kept"),
+    [
+        (1, 120.0, 130.0, 4.0, False),  # a part of it
+        (1, 50.0, 100.0, 4.0, False),  # up to its begin
+        (1, 150.0, 170.0, 4.0, False),
+        (1, 50.0, 99.9, 4.0, True),
+        (1, 150.1, 170.0, 4.0, True),
+        (1, 120.0, 130.0, 4.1, True),  # deeper
+        (1, 120.0, 130.0, 3.9, True),
+        (2, 120.0, 130.0, 4.0, True),
+    ],
+)
+def test_a_stand_takes_the_place_of_what_it_touches_at_its_depth_and_of_nothing_else(
+    store: RefusingStore, epoch: int, begun_at: float, ended_at: float, md: float, is_kept: bool
+) -> None:
+    before, after = Stand(1, 100.0, 150.0, 4.0), Stand(epoch, begun_at, ended_at, md)
+    store.keep_stand(before)
+    store.keep_stand(after)
+    assert set(store.stands()) == ({before, after} if is_kept else {after})
+
+
+def test_a_start_goes_on_with_the_epoch_the_order_and_the_joints_that_were_kept(
+    store: RefusingStore, tmp_path: Path
+) -> None:
+    joints = {(9, 4): JointAngle(0.7, 1e-6)}
+    store.keep_epoch(7)
+    store.keep_tally([9, 4, 6])
+    store.keep_joints(joints)
+    string = KnownString(GroundConfig(folder=tmp_path))
+    keeper = StringKeeper(store, string)
+    assert (string.time.epoch, string.tubes, string.joints.known) == (7, [9, 4, 6], joints)
+    string.time.now = 0.0
+    assert string.knows_tubes
+    store.refusals = 2
+    keeper.keep_tally()  # nothing new: the disk is not asked
+    assert store.refusals == 2
 
 
 def moment(number: int, *, is_known: bool = True) -> Moment:
