@@ -21,9 +21,10 @@ from test_store import survey, url
 from borechain.pki.certificates import make_authority, make_certificate
 from borechain.pki.private_files import write_file, write_private
 from groundstation.config import GroundConfig
-from groundstation.errors import StoreError
+from groundstation.errors import ConfigurationError, StoreError
 from groundstation.gateway.lease import VALID, RigLease
-from groundstation.gateway.page.sessions import FORGOTTEN_S, LONGEST_HOLD_S, WrongPasswords
+from groundstation.gateway.page.passwords import hash_of, is_right
+from groundstation.gateway.page.sessions import FORGOTTEN_S, LONGEST_HOLD_S, REMEMBERED, WrongPasswords
 from groundstation.service.disk.ground_store import Store
 from groundstation.service.disk.keeper import StringKeeper, refusing_disk
 from groundstation.service.disk.moment_keeper import MomentKeeper
@@ -340,6 +341,25 @@ def test_wrong_passwords_are_forgotten_after_exactly_their_time(later: float, ro
     assert wrong.add("a", now + later)[0] == row
     assert wrong.hold_of("a", now + later) == (1.0 if row == 1 else 8.0)
     assert LONGEST_HOLD_S > 8.0
+
+
+def test_of_too_many_addresses_those_that_tried_longest_ago_are_forgotten() -> None:
+    wrong = WrongPasswords()
+    for number in range(REMEMBERED):
+        wrong.add(f"a{number}", 1000.0)
+    wrong.add("a0", 1000.0)  # again, and so not the oldest any more
+    for number in range(3):
+        wrong.add(f"b{number}", 1000.0)
+    held = [name for name in ("a0", "a1", "a2", "a3", "a4", "b0", "b1", "b2") if wrong.hold_of(name, 1000.0) > 0.0]
+    assert held == ["a0", "a4", "b0", "b1", "b2"]
+
+
+def test_no_other_password_is_right_and_least_of_all_none() -> None:
+    hashed = hash_of("eight ch")  # the shortest that there may be
+    tried = ("eight ch", "", "eight c", "Eight ch", "eight ch ")
+    assert [is_right(text, hashed) for text in tried] == [True, False, False, False, False]
+    with pytest.raises(ConfigurationError, match="8 to 256"):
+        hash_of("seven c")
 
 
 @pytest.mark.parametrize("umask", [0o000, 0o077])
