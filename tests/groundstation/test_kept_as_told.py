@@ -18,12 +18,14 @@ import pytest
 from cryptography import x509
 from test_store import survey, url
 
+from borechain.pki import rig_keys
 from borechain.pki.certificates import make_authority, make_certificate
 from borechain.pki.private_files import write_file, write_private
 from groundstation.config import GroundConfig
-from groundstation.errors import StoreError
+from groundstation.errors import ConfigurationError, StoreError
 from groundstation.gateway.lease import VALID, RigLease
-from groundstation.gateway.page.sessions import FORGOTTEN_S, LONGEST_HOLD_S, WrongPasswords
+from groundstation.gateway.page.passwords import hash_of, is_right
+from groundstation.gateway.page.sessions import FORGOTTEN_S, LONGEST_HOLD_S, REMEMBERED, WrongPasswords
 from groundstation.service.disk.ground_store import Store
 from groundstation.service.disk.keeper import StringKeeper, refusing_disk
 from groundstation.service.disk.moment_keeper import MomentKeeper
@@ -34,9 +36,10 @@ from groundstation.service.setup.setup_book import SetupBook
 from groundstation.service.setup.told_value import SetupKind, ToldValue
 from groundstation.service.string.depth import DepthDoubt
 from groundstation.service.string.known_string import KnownString
-from telemetry.errors import MediumError
+from groundstation.survey.fusion.joint_angles import JointAngle
+from telemetry.errors import KeyFileError, MediumError
 from telemetry.messages import DepthReading, Stand
-from telemetry.transport.key_ring import Generation, KeyRing, keys_of, pack_ring, read_ring
+from telemetry.transport.key_ring import MOST_GENERATION, Generation, KeyRing, keys_of, pack_ring, read_ring
 
 NOW = datetime.datetime(2026, 5, 4, 6, tzinfo=datetime.UTC)
 
@@ -156,6 +159,60 @@ def test_a_stand_that_another_follows_at_once_is_kept_with_its_end(store: Refusi
     string.depths.stands = [Stand(1, 100.0, 150.0, 4.0), Stand(1, 160.0, 165.0, 5.0)]
     keeper.keep_stand(reading(3, 165.0, 5.0))
     assert store.stands() == string.depths.stands
+
+
+def test_angles_of_joints_and_progress_are_the_newest_that_were_kept(tmp_path: Path) -> None:
+    for angles in (
+        {(3, 2): JointAngle(0.7, 1e-6), (2, 1): JointAngle(-1.2, 4e-6)},
+        {(2, 1): JointAngle(0.1, 9e-6)},
+        {},
+    ):
+        for text in ("one", "another"):
+            with contextlib.closing(Store(url(tmp_path))) as store:
+                store.keep_joints(angles)
+                store.keep_progress(text)
+            with contextlib.closing(Store(url(tmp_path))) as store:
+                assert store.joints() == angles
+                assert store.progress() == text
+
+
+@pytest.mark.parametrize(
+    ("epoch", "begun_at", "ended_at", "md", "is_kept"),
+    [
+        (1, 120.0, 130.0, 4.0, False),  # a part of it
+        (1, 50.0, 100.0, 4.0, False),  # up to its begin
+        (1, 150.0, 170.0, 4.0, False),
+        (1, 50.0, 99.9, 4.0, True),
+        (1, 150.1, 170.0, 4.0, True),
+        (1, 120.0, 130.0, 4.1, True),  # deeper
+        (1, 120.0, 130.0, 3.9, True),
+        (2, 120.0, 130.0, 4.0, True),
+    ],
+)
+def test_a_stand_takes_the_place_of_what_it_touches_at_its_depth_and_of_nothing_else(
+    store: RefusingStore, epoch: int, begun_at: float, ended_at: float, md: float, is_kept: bool
+) -> None:
+    before, after = Stand(1, 100.0, 150.0, 4.0), Stand(epoch, begun_at, ended_at, md)
+    store.keep_stand(before)
+    store.keep_stand(after)
+    assert set(store.stands()) == ({before, after} if is_kept else {after})
+
+
+def test_a_start_goes_on_with_the_epoch_the_order_and_the_joints_that_were_kept(
+    store: RefusingStore, tmp_path: Path
+) -> None:
+    joints = {(9, 4): JointAngle(0.7, 1e-6)}
+    store.keep_epoch(7)
+    store.keep_tally([9, 4, 6])
+    store.keep_joints(joints)
+    string = KnownString(GroundConfig(folder=tmp_path))
+    keeper = StringKeeper(store, string)
+    assert (string.time.epoch, string.tubes, string.joints.known) == (7, [9, 4, 6], joints)
+    string.time.now = 0.0
+    assert string.knows_tubes
+    store.refusals = 2
+    keeper.keep_tally()  # nothing new: the disk is not asked
+    assert store.refusals == 2
 
 
 def moment(number: int, *, is_known: bool = True) -> Moment:
@@ -287,6 +344,25 @@ def test_wrong_passwords_are_forgotten_after_exactly_their_time(later: float, ro
     assert LONGEST_HOLD_S > 8.0
 
 
+def test_of_too_many_addresses_those_that_tried_longest_ago_are_forgotten() -> None:
+    wrong = WrongPasswords()
+    for number in range(REMEMBERED):
+        wrong.add(f"a{number}", 1000.0)
+    wrong.add("a0", 1000.0)  # again, and so not the oldest any more
+    for number in range(3):
+        wrong.add(f"b{number}", 1000.0)
+    held = [name for name in ("a0", "a1", "a2", "a3", "a4", "b0", "b1", "b2") if wrong.hold_of(name, 1000.0) > 0.0]
+    assert held == ["a0", "a4", "b0", "b1", "b2"]
+
+
+def test_no_other_password_is_right_and_least_of_all_none() -> None:
+    hashed = hash_of("eight ch")  # the shortest that there may be
+    tried = ("eight ch", "", "eight c")
+    assert [is_right(text, hashed) for text in tried] == [True, False, False]
+    with pytest.raises(ConfigurationError, match="8 to 256"):
+        hash_of("seven c")
+
+
 @pytest.mark.parametrize("umask", [0o000, 0o077])
 def test_files_have_the_rights_that_they_are_to_have_whatever_was_there(tmp_path: Path, umask: int) -> None:
     before = os.umask(umask)
@@ -324,3 +400,13 @@ def test_keys_of_before_are_warned_of_from_exactly_their_time_on(tmp_path: Path,
     write_private(tmp_path / "tube-1.keys", pack_ring(KeyRing("rig-1", 1, tuple(made))))
     at = NOW + datetime.timedelta(microseconds=late)
     assert len(read_ring(tmp_path / "tube-1.keys", 1, at).warnings) == warned
+
+
+def test_keys_are_changed_up_to_exactly_the_last_generation(tmp_path: Path) -> None:
+    secret = rig_keys.init_rig(tmp_path, "rig-1", NOW)
+    late = replace(secret, generations=(replace(secret.generations[0], number=MOST_GENERATION - 1),))
+    rig_keys._write(tmp_path, late, [])
+    assert [g.number for g in rig_keys.rotate_keys(tmp_path, NOW).generations] == [254, 255]
+    with pytest.raises(KeyFileError, match="all 255 generations are used"):
+        rig_keys.rotate_keys(tmp_path, NOW)
+    assert [g.number for g in rig_keys.read_secret(tmp_path).generations] == [254, 255]
