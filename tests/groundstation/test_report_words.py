@@ -39,7 +39,7 @@ NAMES = {
     "calibration, Allan analysis and the filter's own variances, station by station",
 }  # fmt: skip
 UNITS = r"[\W\d_]*(\b(m|mm|deg|azi|incl|N|E|s|MD|sigma)\b[\W\d_]*)*"
-NO_WORD = re.compile(UNITS + r"|[0-9a-f]{64}|[A-Z]+(-[A-Z]+)?|[PRKD]-?\d+.*|[\d.]+ .{1,5}|[xyz]|[xyz][+-].*")
+NO_WORD = re.compile(UNITS + r"|[0-9a-f]{64}|[A-Z]+(-[A-Z]+)?|[PRKD]-?\d+.*|[\d.]+ .{1,5}|[-+−]?[xyz]|[\d.e−-]+")
 
 
 def origin_in(language: str) -> Origin:
