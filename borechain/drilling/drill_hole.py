@@ -14,6 +14,7 @@ from borechain.drilling.inline import InlineRig
 from borechain.drilling.rig_job import DrilledRig, RigJob, RigRun, RigWatcher, ShowProgress, say_on_stderr
 from borechain.drilling.rig_processes import drill_in_processes, process_table, settings_of
 from groundstation.gateway.page.page_settings import PageSettings
+from node.kernels.arithmetic.jit import processor_in_use
 from sim.errors import RigError, ScenarioError
 from sim.rig.ground_answers import ASKED
 from sim.rig.launcher import next_run_folder, prepare_folder
@@ -53,6 +54,7 @@ def drill_hole(job: RigJob, bus: ZenohBus | None, watcher: RigWatcher) -> Drille
         raise RigError(f"interrupted; every process was ended, what was stored is in {folder}") from None
     result = rig_result(run.answers, world)
     result |= {"processes": run.processes, "wall_s": round(time.monotonic() - started, 3), "restarts": run.restarts}
+    result["kernels"] = processor_in_use()
     write_files(folder, result)
     return DrilledRig(result, folder)
 

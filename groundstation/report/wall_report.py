@@ -17,6 +17,7 @@ from groundstation.report.document import (
     ReportSection,
     report_pdf,
 )
+from groundstation.report.plane_words import name_axes
 from groundstation.report.plots_wall import wall_figure
 from groundstation.report.style import svg_of
 from groundstation.report.word_tables import NOT_STATED
@@ -132,7 +133,8 @@ def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
     joint, _ = worst_joint(judgement.joints)
     title = f"{len(wall.pairs)} joints: {WORDS[judgement.verdict].lower()}"
     extra = dict(judgement.extras).get(joint)
-    picture = wall_figure(wall.built.columns, judgement.joints, file.thickness, extra, title)
+    words = name_axes(wall.built.frame)
+    picture = wall_figure(wall.built.columns, judgement.joints, file.thickness, extra, title, words=words)
     sections = [
         ReportSection("Reasons", [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings] or ["None."]),
         ReportSection("What is to be done", remedy_lines(wall, judgement) or ["Nothing."]),

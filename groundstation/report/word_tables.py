@@ -24,7 +24,7 @@ OWN_WORDS = (
 )  # fmt: skip
 
 
-def languages() -> list[str]:
+def known_languages() -> list[str]:
     """Codes of the languages that a report may have."""
     names = (entry.name for entry in (resources.files("groundstation.report") / "words").iterdir())
     return sorted([ENGLISH, *(name.removesuffix(".toml") for name in names if name.endswith(".toml"))])
@@ -90,8 +90,8 @@ def word_table(language: str) -> WordTable:
     SurveyError
         When there is none.
     """
-    if language not in languages():
-        raise SurveyError(f"--language: expected one of {', '.join(languages())}, got {language!r:.20}")
+    if language not in known_languages():
+        raise SurveyError(f"--language: expected one of {', '.join(known_languages())}, got {language!r:.20}")
     if language == ENGLISH:
         return WordTable({}, {})
     file = resources.files("groundstation.report") / "words" / f"{language}.toml"

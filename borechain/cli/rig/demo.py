@@ -12,6 +12,7 @@ import click
 
 from borechain.cli.faults import plain_faults, require_modules
 from borechain.cli.notices import print_notice
+from borechain.cli.rig.compiling_bar import compile_for_rig
 from borechain.cli.shared_options import parse_speed
 from borechain.drilling.rig_job import RigJob, show_nothing
 from groundstation.page_options import DEFAULT, PageRequest, page_settings
@@ -62,6 +63,7 @@ def demo(page: str, speed: float, endpoint: str, rounds: int | None) -> None:
         return
     open_page_socket(settings).close()
     check_port_free(endpoint)
+    compile_for_rig(SCENARIO)
     served = page_with_password(settings, print_notice)
     click.echo(f"open {served.url} in a browser; Ctrl-C ends the demonstration")
     try:

@@ -12,6 +12,7 @@ import click
 
 from borechain.cli.faults import EnvironmentFault, InputFault, plain_faults, require_modules
 from borechain.cli.notices import print_notice
+from borechain.cli.rig.compiling_bar import compile_for_rig
 from borechain.cli.rig.drilling_bar import DrillingBar
 from borechain.cli.rig.shown_result import show_result
 from borechain.cli.shared_options import fault_option, json_option, scenario_argument, seed_option, speed_option
@@ -93,6 +94,7 @@ def rig(job: RigJob, page: PageRequest, view: str | None, as_json: bool) -> None
 
     job = checked_job(job, page)
     on_terminal = sys.stdout.isatty() and job.served is None  # a page is looked at in place of a second screen
+    compile_for_rig(job.scenario, job.chips)
     view = chosen_view(view, inline=job.inline, quiet=as_json, on_terminal=on_terminal)
     if view == "crew":
         from borechain.cli.rig.on_screen import drill_on_screen

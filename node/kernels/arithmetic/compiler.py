@@ -11,6 +11,7 @@ lowest that pyproject.toml allows. What each part buys:
 * ``ONLY_BORROWED``: kernels count no references to the arrays that they are given, which took a quarter of a node's
   step; one that would make an array is refused as it is compiled.
 * ``kept_where``: a kept function is known by our sources and not by the date of its file.
+* ``telling_compiled``: one who waits is told how far the compiler is.
 * ``leave_blas_out``: a process starts a quarter of a second sooner.
 """
 
@@ -18,11 +19,12 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, Final, cast
 
 import numba
 from numba import config, types
+from numba.core import event
 from numba.core.caching import UserProvidedCacheLocator
 from numba.core.imputils import lower_constant
 from numba.core.typeconv.castgraph import Conversion
@@ -40,6 +42,7 @@ __all__ = [
     "is_argument",
     "kept_where",
     "leave_blas_out",
+    "telling_compiled",
 ]
 
 FORMS: Final = (types.float64, types.int64)
@@ -139,6 +142,34 @@ def kept_where(locator: type[Any]) -> Iterator[None]:
         yield
     finally:
         vars(config)["CACHE_LOCATOR_CLASSES"] = before
+
+
+class _Compilations(event.Listener):
+    """Tells of every function that is compiled and not loaded, as it begins and ends."""
+
+    def __init__(self, began: Callable[[], object], ended: Callable[[], object]) -> None:
+        self._began, self._ended = began, ended
+
+    def on_start(self, event: Any) -> None:
+        """A function is compiled."""
+        del event
+        self._began()
+
+    def on_end(self, event: Any) -> None:
+        """It is."""
+        del event
+        self._ended()
+
+
+@contextlib.contextmanager
+def telling_compiled(began: Callable[[], object], ended: Callable[[], object]) -> Iterator[None]:
+    """Have ``began`` and ``ended`` called around every function that is compiled meanwhile, those within others too."""
+    listener = _Compilations(began, ended)
+    event.register("numba:compile", listener)  # type: ignore[no-untyped-call]
+    try:
+        yield
+    finally:
+        event.unregister("numba:compile", listener)  # type: ignore[no-untyped-call]
 
 
 def leave_blas_out() -> None:

@@ -2,7 +2,8 @@
 
 Numba knows a kept function by the place and the date of its file, and not by the functions it calls: a copy of the same
 sources would be compiled anew, and an edited callee would go on running in its old form. Ours are known by the digest
-of all kernel sources, wherever these lie: a checkout, its copy and the wheel made of it share what is compiled.
+of all kernel sources, wherever these lie: a checkout, its copy and the wheel made of it share what is compiled. A wheel
+may bring compiled kernels along (``delivered.py``), which are unpacked at the first start.
 
 Where that folder cannot be written, a temporary one is used and said so once; processes started from here inherit it.
 """
@@ -20,13 +21,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
+import llvmlite.binding
 import numba
 import numpy as np
 from numba import config, njit
 
 from node.kernels.arithmetic.compiler import COUNTED, NO_WRAPPER, ONLY_BORROWED, UserProvidedCacheLocator, kept_where
+from node.kernels.arithmetic.delivered import UNREADABLE, compile_for_baseline, find_delivered, unpack_kernels
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+DELIVERED: Final = "-delivered"  # at the end of the name of a folder
 OPTIONS: Final[dict[str, Any]] = {"cache": True, "error_model": "numpy", **NO_WRAPPER, **ONLY_BORROWED}
 
 
@@ -45,25 +49,32 @@ def source_digest() -> str:
     return hashlib.sha256(sources.encode()).hexdigest()[:16]
 
 
+def cache_name() -> str:
+    """Name of the folder of the compiled kernels; that of delivered ones is another."""
+    return f"kernels-{source_digest()}{DELIVERED if find_delivered(source_digest()) else ''}"
+
+
 def cache_folder() -> Path:
     """Folder of the compiled kernels: ``$XDG_CACHE_HOME/borechain/kernels-<digest>``."""
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
-    return home / "borechain" / f"kernels-{source_digest()}"
+    return home / "borechain" / cache_name()
 
 
 def fallback_folder() -> Path:
     """Temporary folder of this user alone; what another one has put there is code and is never loaded."""
-    folder = Path(tempfile.gettempdir()) / f"borechain-{os.getuid()}-kernels-{source_digest()}"
+    folder = Path(tempfile.gettempdir()) / f"borechain-{os.getuid()}-{cache_name()}"
     with contextlib.suppress(FileExistsError):
         folder.mkdir(mode=0o700)
     found = folder.lstat()
     if found.st_uid == os.getuid() and stat.S_ISDIR(found.st_mode) and stat.S_IMODE(found.st_mode) == 0o700:
         return folder
-    return Path(tempfile.mkdtemp(prefix="borechain-kernels-"))
+    return Path(
+        tempfile.mkdtemp(prefix="borechain-kernels-", suffix=DELIVERED if find_delivered(source_digest()) else "")
+    )
 
 
-def use_cache() -> None:
-    """Have numba keep the compiled kernels in their folder, or in a temporary one."""
+def writable_folder() -> Path:
+    """The usual folder, or a temporary one, which is said, for this process and those that it starts."""
     folder = cache_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -77,6 +88,19 @@ def use_cache() -> None:
             f"borechain: compiled kernels are kept in {folder}, for {refused} cannot be written ({reason}); "
             "set XDG_CACHE_HOME to a folder that can\n"
         )
+    return folder
+
+
+def use_cache() -> None:
+    """Have numba keep the compiled kernels in their folder, where those lie that were delivered."""
+    folder, archive = writable_folder(), find_delivered(source_digest())
+    if archive is not None:
+        compile_for_baseline()
+        try:
+            if not any(folder.iterdir()):
+                unpack_kernels(archive, folder)
+        except UNREADABLE as error:
+            sys.stderr.write(f"borechain: expected compiled kernels in {archive} ({error}); they are compiled here\n")
     vars(config)["CACHE_DIR"] = str(folder)
 
 
@@ -87,6 +111,12 @@ if not os.environ.get("NUMBA_CACHE_DIR"):
 def folder_in_use() -> Path:
     """Folder that compiled kernels are kept in by this process: the usual one, or what took its place."""
     return Path(vars(config)["CACHE_DIR"])
+
+
+def processor_in_use() -> str:
+    """The processor that kernels are compiled for, and whether they were delivered, for a result."""
+    name = vars(config)["CPU_NAME"] or llvmlite.binding.get_host_cpu_name()
+    return f"{name}, delivered" if folder_in_use().name.endswith(DELIVERED) else f"{name}, compiled here"
 
 
 class SourceLocator(UserProvidedCacheLocator):

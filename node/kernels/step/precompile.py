@@ -10,7 +10,7 @@ from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import default_config, new_state
 from node.kernels.record.node_record import AIDING, END, FZ, JOINED, MOMENT, READING, SETTINGS, START, new_node
 from node.kernels.sensors.correction import identity_parameters
-from node.kernels.step.node_step import node_aiding, node_step
+from node.kernels.step.node_step import end_step, node_aiding, node_step
 from node.kernels.string.drive_torque import DRIVE
 from node.kernels.string.encoder_step import SAMPLE, encoder_step, new_encoder
 
@@ -41,6 +41,14 @@ def warm_step(step: Callable[..., int], aiding: Callable[..., int]) -> None:
 def warm_up() -> None:
     """Run a node with the default kernel: all that a cycle or an aiding calls is inside these two."""
     warm_step(node_step, node_aiding)
+
+
+def warm_end() -> None:
+    """Run what comes after the loop of a step: a third of what there is to compile, which another process may do."""
+    nodes, settings, moment = new_node(default_config()), np.zeros(1, SETTINGS), np.zeros(MOMENT)
+    settings["state_every"] = settings["imus"] = 1
+    moment[END] = PERIOD
+    end_step(nodes, settings, moment, 0, 0)
 
 
 def warm_encoder() -> None:

@@ -13,7 +13,7 @@ from node.translation.firmware_build import FirmwareRequest, build_firmware
 from node.translation.toolchains import TOOLCHAINS
 
 LIMITS = {"step_most": 120_000, "stack": 3_000}  # instructions and bytes, of a node of one IMU
-SLOWEST = 16_000_000  # instructions: half a cycle at 64 MHz, for a filter that has failed and is held within its range
+SLOWEST = 2_000_000  # instructions: a sixteenth of a cycle at 64 MHz, for the end of an alignment by extremes
 EMULATORS = {"qemu-system-arm": "qemu-system-arm", "qemu-system-riscv32": "qemu-system-misc"}
 LIBRARIES = {"arm-none-eabi-": "libnewlib-arm-none-eabi", "riscv64-unknown-elf-": "picolibc-riscv64-unknown-elf"}
 

@@ -223,7 +223,7 @@ def test_the_sums_of_the_longest_turn_fit() -> None:
     assert np.abs(sweep.view(np.int64)).max() < NO_NUMBER
 
 
-@given(st.floats(-1.0, 4.5).map(lambda power: 10.0**power), st.integers(1, 600))
+@given(st.floats(-1.0, 4.5).map(lambda power: 10.0**power), st.integers(1, 3000))
 def test_the_law_of_extremes_is_the_same(ratio: float, samples: int) -> None:
     """Few samples of little noise lie so far below the radius that the law ends; what it comes to then is next to 0."""
     found = variance_in_integers(round(ratio * 2.0**24), samples) * 2.0**-38

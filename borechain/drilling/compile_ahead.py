@@ -1,0 +1,69 @@
+"""Kernels compiled before a rig begins, in several processes: a newcomer sees how far they are.
+
+Without it the fork server compiles them, one after the other and without a word. A file in their folder says that all
+of a rig's are there, by the digest of the sources that they are made of.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Final
+
+import groundstation.survey
+from node.kernels.arithmetic.jit import folder_digest, folder_in_use, source_digest
+
+PARTS_OF: Final[Mapping[str, Sequence[str]]] = {
+    "float64": ("step", "surveys"),
+    "fixed": ("step", "surveys", "integers"),
+    "chip": ("step", "surveys", "integers"),
+}  # by kernel, see ``kernel_parts``
+ABOUT: Final[Mapping[str, int]] = {"step": 305, "surveys": 330, "integers": 500}  # functions that a part compiles
+
+ShowCompiling = Callable[[int], AbstractContextManager[Callable[[int], None]]]  # of how many; then how many are done
+
+
+def are_compiled(kernel: str) -> bool:
+    """Whether all that a rig of this kernel needs was compiled, or delivered."""
+    return all(mark_of(part).exists() for part in PARTS_OF[kernel])
+
+
+def mark_of(part: str) -> Path:
+    """The file that says that a part is compiled."""
+    sources = source_digest() + folder_digest(Path(groundstation.survey.__path__[0]))
+    return folder_in_use() / f"{part}-{hashlib.sha256(sources.encode()).hexdigest()[:16]}"
+
+
+def compile_ahead(kernel: str, show: ShowCompiling) -> None:
+    """Compile what is lacking of a rig's kernels, its parts beside each other; without a word where nothing is.
+
+    A part that fails is left to the rig, which then says why.
+    """
+    lacking = [part for part in PARTS_OF[kernel] if not mark_of(part).exists()]
+    if not lacking:
+        return
+    with show(sum(ABOUT[part] for part in lacking)) as tell:
+        for part in compile_parts(lacking, tell):
+            mark_of(part).touch()
+
+
+def compile_parts(parts: Sequence[str], tell: Callable[[int], None]) -> list[str]:
+    """Compile parts, each in a process of its own, telling how many functions are done; those that succeeded."""
+    reading, writing = os.pipe()
+    command = [sys.executable, "-m", "borechain.drilling.kernel_parts"]
+    running = {part: subprocess.Popen([*command, part], stdout=writing) for part in parts}
+    os.close(writing)
+    try:
+        with os.fdopen(reading) as lines:
+            for done, _ in enumerate(lines, 1):
+                tell(done)
+        return [part for part, process in running.items() if process.wait() == 0]
+    finally:
+        for process in running.values():
+            process.kill()
+            process.wait()

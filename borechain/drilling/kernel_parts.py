@@ -1,0 +1,63 @@
+"""Parts of what a rig compiles, each by a process of its own: ``python -m borechain.drilling.kernel_parts PART``.
+
+A line goes to its output for every function that was compiled. What is there already is loaded, so that a part takes a
+second where nothing is lacking.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from node.kernels.arithmetic.compiler import leave_blas_out, telling_compiled
+
+
+def compile_step() -> None:
+    """The step of a node in floats."""
+    from node.kernels.step.precompile import warm_up
+
+    warm_up()
+
+
+def compile_surveys() -> None:
+    """The end of a step, which the part ``step`` then finds; the encoder; the ground station's surveys."""
+    from node.kernels.step.precompile import warm_encoder, warm_end
+
+    warm_end()
+    warm_encoder()
+    from groundstation.survey.adjustment.warm_adjustment import warm_adjustment
+    from groundstation.survey.path.kernels import curvature_filter, frame_along, mixture_chances
+    from groundstation.survey.well.kernels import position_errors
+
+    for kernels in (position_errors, frame_along, curvature_filter, mixture_chances):
+        kernels.warm_up()
+    warm_adjustment()
+
+
+def compile_integers() -> None:
+    """The step of a node in integers."""
+    from node.firmware.kernel_choice import kernel_of
+    from node.kernels.step.precompile import warm_step
+
+    loop = kernel_of("fixed")
+    warm_step(loop.step, loop.aiding)
+
+
+PARTS: Final[Mapping[str, Callable[[], None]]] = {
+    "step": compile_step,
+    "surveys": compile_surveys,
+    "integers": compile_integers,
+}
+
+
+def say_one() -> None:
+    """Write the line of a function that was compiled."""
+    sys.stdout.write(".\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    leave_blas_out()
+    with telling_compiled(began=lambda: None, ended=say_one):
+        PARTS[sys.argv[1]]()
