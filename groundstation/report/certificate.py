@@ -14,7 +14,12 @@ import typst
 from groundstation.errors import GroundError
 from groundstation.report.figure_panels import Panel, render_panels
 from groundstation.report.sheet import Sheet
+from groundstation.report.word_tables import ENGLISH, labels_of, word_table
 
+LABELS = {
+    "kind": "Calibration certificate", "day": "Date", "record": "Record", "record_hash": "SHA-256 of the record",
+    "block_hash": "SHA-256 of the block", "software": "Software", "warning": "Warning",
+}  # fmt: skip
 TEMPLATE = Path(__file__).with_name("certificate.typ")
 
 
@@ -36,27 +41,32 @@ class Identity:
     block_sha256: str | None
     software: str
     papers: tuple[tuple[str, str], ...] = ()
+    language: str = ENGLISH
 
 
 def template_data(sheet: Sheet, panels: Sequence[Panel], identity: Identity) -> str:
-    """Everything the template sets, as JSON; figures as SVG text."""
+    """Everything the template sets, as JSON, in the language of its identity; figures as SVG text."""
+    words = word_table(identity.language)
+    say = words.every
     return json.dumps(
         {
-            "title": sheet.title,
+            "labels": labels_of(LABELS, identity.language),
+            "language": identity.language,
+            "title": say(sheet.title),
             "subject": identity.subject,
             "day": identity.day.isoformat(),
             "record": identity.record,
             "record_sha256": identity.record_sha256,
             "block_sha256": identity.block_sha256,
             "software": identity.software,
-            "papers": [list(paper) for paper in identity.papers],
-            "facts": [list(fact) for fact in sheet.facts],
-            "warnings": list(sheet.warnings),
+            "papers": words.facts(identity.papers),
+            "facts": words.facts(sheet.facts),
+            "warnings": say(sheet.warnings),
             "tables": [
-                {"title": t.title, "columns": list(t.columns), "rows": [list(row) for row in t.rows]}
+                {"title": say(t.title), "columns": say(list(t.columns)), "rows": words.rows(t.rows)}
                 for t in sheet.tables
             ],
-            "figures": [{"caption": p.caption, "svg": render_panels([p], "svg").decode()} for p in panels],
+            "figures": [{"caption": say(p.caption), "svg": render_panels([p], "svg").decode()} for p in panels],
         }
     )
 

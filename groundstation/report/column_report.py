@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.report.document import Document, Origin, ReportSection
+from groundstation.report.document import AS_BUILT, Document, Origin, ReportSection
 from groundstation.report.plots import survey_figure
 from groundstation.report.style import svg_of
+from groundstation.report.word_tables import NOT_STATED
 from groundstation.survey.tools.instruments import SurveyTool
 from groundstation.survey.wall.column_deviation import ColumnDesign, Deviation, Tolerance, point_deviation
 from groundstation.survey.well.reference_frames import SiteGrid
@@ -22,6 +23,7 @@ from groundstation.survey.well.trajectory_rows import TrajectoryPoint
 
 Array = npt.NDArray[np.float64]
 CONFIDENCE = 0.95
+CONTAINED = "errors of the instrument and of setting out; no mistakes"
 CLAUSES = {
     "en-12716": "EN 12716, execution of jet grouting: 50 mm at the head and 2 % of the length drilled",
     "5-cm": "50 mm at every depth",
@@ -105,7 +107,8 @@ def column_report(record: ColumnRecord, site: ReportSite, origin: Origin) -> Doc
         )  # fmt: skip
         sections.append(ReportSection("Plan and sections", figure=svg_of(figure), new_page=True))
     title = f"Column {record.design.name}"
-    return Document("Column report", title, site.project or "as built", verdict, good, site.facts(), sections, origin)
+    facts = [*site.facts(), *paper_facts(record)]
+    return Document("Column report", title, site.project or AS_BUILT, verdict, good, facts, sections, origin)
 
 
 def _from_its_head(design: ColumnDesign) -> ColumnDesign:
@@ -169,9 +172,15 @@ def instrument_facts(record: ColumnRecord) -> list[tuple[str, str]]:
     return [
         ("Error model", f"{tool.name}: {tool.title}"),
         ("Its source", tool.source or "not stated"),
-        ("Serial number", record.serial or "not stated"),
-        ("Calibration", record.calibration or "not stated"),
+        ("Serial number", record.serial or NOT_STATED),
+        ("Calibration", record.calibration or NOT_STATED),
     ]
+
+
+def paper_facts(record: ColumnRecord) -> list[tuple[str, str]]:
+    """What the first page says of the instrument and of the ±."""
+    told = " / ".join(text or NOT_STATED for text in (record.serial, record.calibration))
+    return [("Serial and calibration of the instruments", told), ("What the ± contains", CONTAINED)]
 
 
 def _table(record: ColumnRecord, found: Sequence[Deviation], site: ReportSite) -> dict[str, object]:

@@ -9,10 +9,18 @@ import numpy as np
 
 from groundstation.errors import SurveyError
 from groundstation.report.column_report import ColumnRecord, ReportSite, column_report, tolerance_text
-from groundstation.report.document import Document, Origin, ReportSection, report_pdf
+from groundstation.report.document import (
+    AS_BUILT,
+    Document,
+    Origin,
+    ReportPapers,
+    ReportSection,
+    report_pdf,
+)
 from groundstation.report.plane_words import name_axes
 from groundstation.report.plots_wall import wall_figure
 from groundstation.report.style import svg_of
+from groundstation.report.word_tables import NOT_STATED
 from groundstation.survey.wall.column_errors import survey_errors
 from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.wall_columns import state_words
@@ -28,6 +36,7 @@ WORDS = {
     WallVerdict.NOT_PROVEN: "not proven to be tight",
     WallVerdict.NOT_TIGHT: "NOT TIGHT",
 }
+CONTAINED = "errors of the instrument, setting out, how a hole runs where it was not surveyed; no mistakes"
 
 
 def site_of(wall: Wall) -> ReportSite:
@@ -116,6 +125,10 @@ def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
             "P(anything open or too thin)",
             f"{whole.probability:.2g} (standard error {whole.standard_error:.1g}), allowed {file.allowed:g}",
         ),
+        ("Site", site_text(wall)),
+        ("Serial and calibration of the instruments", stated_words(records)),
+        ("Check of the data", check_words(wall)),
+        ("What the ± contains", CONTAINED),
     ]
     joint, _ = worst_joint(judgement.joints)
     title = f"{len(wall.pairs)} joints: {WORDS[judgement.verdict].lower()}"
@@ -134,7 +147,32 @@ def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
     ]
     good = judgement.verdict is WallVerdict.TIGHT
     verdict = f"The wall is {WORDS[judgement.verdict]}"
-    return Document("Wall report", file.name, site.project or "as built", verdict, good, facts, sections, origin)
+    return Document("Wall report", file.name, site.project or AS_BUILT, verdict, good, facts, sections, origin)
+
+
+def site_text(wall: Wall) -> str:
+    """Gravity, and where an instrument is magnetic its field."""
+    site = wall.file.assumed.site
+    words = f"gravity {site.gravity:.5f} m/s^2"
+    if not any(plan.tool.asks_for("BField") for plan in wall.plans):
+        return words
+    dip, declination = math.degrees(site.dip), math.degrees(site.declination)
+    return f"{words}; field {site.b_field:.1f} nT, dip {dip:.3f} deg, declination {declination:.3f} deg"
+
+
+def stated_words(records: list[ColumnRecord]) -> str:
+    """Of how many surveyed columns the instrument is told, so that the first page says where it is not."""
+    surveyed = [record for record in records if math.isfinite(record.surveyed_md)]
+    told = sum(bool(record.serial and record.calibration) for record in surveyed)
+    if told == len(surveyed):
+        return f"stated of all {told} columns that were surveyed"
+    return f"stated of {told} of {len(surveyed)} columns that were surveyed" if told else NOT_STATED
+
+
+def check_words(wall: Wall) -> str:
+    """How many values are missing, or hardly can be; each is a reason below."""
+    count = len(wall.warnings)
+    return f"warnings: {count}" if count else "nothing is missing, and nothing is beyond what steel does"
 
 
 def tight_words(wall: Wall) -> str:
@@ -270,7 +308,9 @@ def _names(names: list[str], order: list[str]) -> str:
     return ", ".join(f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(run) for run in runs)
 
 
-def wall_report_pdf(wall: Wall, judgement: Judgement, column: str | None, day: date, version: str) -> bytes:
+def wall_report_pdf(
+    wall: Wall, judgement: Judgement, column: str | None, day: date, version: str, papers: ReportPapers
+) -> bytes:
     """Report of the wall, or of one of its columns, as a document to be signed.
 
     Raises
@@ -282,4 +322,4 @@ def wall_report_pdf(wall: Wall, judgement: Judgement, column: str | None, day: d
     if column is not None and column not in names:
         raise SurveyError(f"--column: expected one of {', '.join(names)}, got {column}")
     digests = [(f"SHA-256 of {name}", digest) for name, digest in wall.file.digests()]
-    return report_pdf(report_on(wall, judgement, column, Origin(day, version, digests)))
+    return report_pdf(report_on(wall, judgement, column, Origin(day, version, digests, papers)))

@@ -16,6 +16,7 @@ import click
 from borechain import __version__
 from borechain.cli.console_tables import table_console
 from borechain.cli.faults import EnvironmentFault, InputFault
+from borechain.cli.report_options import LANGUAGES
 from borechain.cli.shared_options import json_option
 from borechain.cli.whole_files import PLOT_FORMATS, check_suffix
 from groundstation.report.calibrations.calibration_request import UNITS
@@ -46,6 +47,9 @@ output_options = (
     click.option("--serial", default="", help="Serial number of what was calibrated, for the certificate."),
     click.option("--number", default="", help="Number of the certificate."),
     click.option("--due", type=click.DateTime(["%Y-%m-%d"]), help="Day of the next calibration, for the certificate."),
+    click.option(
+        "--language", type=click.Choice(LANGUAGES), default="en", show_default=True, help="Of the certificate."
+    ),
     json_option,
 )  # of WantedFiles
 landing_options = (full_scale_option, force_option, *output_options)  # of a calibration that gates may refuse
@@ -68,6 +72,7 @@ class WantedFiles:
     serial: str = ""
     number: str = ""
     due: datetime.datetime | None = None
+    language: str = "en"
 
     @property
     def day(self) -> datetime.date:
@@ -130,7 +135,7 @@ def rendered_files(outcome: CalibrationOutcome, wanted: WantedFiles, day: dateti
     if wanted.certificate is not None:
         subject, record = wanted.subject or wanted.file.stem, wanted.file
         hashes = (outcome.record_sha256, outcome.block_sha256)
-        identity = Identity(subject, day, record.name, *hashes, __version__, wanted.papers)
+        identity = Identity(subject, day, record.name, *hashes, __version__, wanted.papers, wanted.language)
         files[wanted.certificate] = certificate_pdf(outcome.sheet, panels, identity)
     return files
 

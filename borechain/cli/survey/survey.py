@@ -10,7 +10,7 @@ import click
 from borechain.cli.console_tables import show_warnings, table_console
 from borechain.cli.faults import plain_faults
 from borechain.cli.shared_options import json_option
-from borechain.cli.survey.survey_options import SurveyFiles, survey_options
+from borechain.cli.survey.survey_options import HolePaperRequest, SurveyFiles, survey_options
 from borechain.cli.whole_files import write_whole
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ SOURCES_SHOWN = 12
 @survey_options
 @json_option
 @plain_faults
-def survey(request: SurveyRequest, files: SurveyFiles, as_json: bool) -> None:
+def survey(request: SurveyRequest, files: SurveyFiles, paper: HolePaperRequest, as_json: bool) -> None:
     """Compute trajectory and region of uncertainty of FILE.
 
     FILE is a table of stations (measured depth, inclination, azimuth, as most programs write them) or of lateral
@@ -39,15 +39,15 @@ def survey(request: SurveyRequest, files: SurveyFiles, as_json: bool) -> None:
 
     files.check(request)
     answer = api.answer_survey(request)
-    write_survey(answer, files)
+    write_survey(answer, files, paper)
     if as_json:
         click.echo(json.dumps(answer.result))
     else:
         show_survey(answer.result)
 
 
-def write_survey(answer: SurveyAnswer, files: SurveyFiles) -> None:
-    """Write what is asked for: tables, picture, error model."""
+def write_survey(answer: SurveyAnswer, files: SurveyFiles, paper: HolePaperRequest) -> None:
+    """Write what is asked for: tables, picture, error model, report."""
     from groundstation.survey.requests.survey_tables import source_table_text, station_table_text
 
     if files.out is not None:
@@ -61,6 +61,8 @@ def write_survey(answer: SurveyAnswer, files: SurveyFiles) -> None:
         save_figure(draw_survey(answer), files.plot)
     if files.export_tool is not None:
         write_whole(files.export_tool, answer.tool_text())
+    if files.report is not None:
+        write_whole(files.report, paper.to_pdf(answer))
 
 
 def brought_words(result: dict[str, Any]) -> str:

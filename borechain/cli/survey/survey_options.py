@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+from borechain import __version__
 from borechain.cli.faults import InputFault
+from borechain.cli.report_options import PaperRequest, paper_options
 from borechain.cli.survey.site_options import site_options
 from borechain.cli.whole_files import PLOT_FORMATS, check_suffix
 from groundstation.survey.requests.survey_request import PROGRAMME_ALONE, FrameRequest, SiteFigures, SurveyRequest
 from telemetry.runtime.command_line import check_installed
 from telemetry.runtime.typed_options import gather_options
+
+if TYPE_CHECKING:
+    from groundstation.survey.requests.survey_answer import SurveyAnswer
 
 NORTHS = ("site", "true", "grid", "magnetic")
 DEPTHS_FROM = (
@@ -30,6 +38,7 @@ class SurveyFiles:
     by_source: Path | None
     plot: Path | None
     export_tool: Path | None
+    report: Path | None
 
     def check(self, request: SurveyRequest) -> None:
         """Refuse files that could not be written or do not fit what is asked, before anything is computed.
@@ -43,10 +52,38 @@ class SurveyFiles:
         check_suffix("--by-source", self.by_source, ".csv")
         check_suffix("--plot", self.plot, *PLOT_FORMATS)
         check_suffix("--export-tool", self.export_tool, ".json")
+        check_suffix("--report", self.report, ".pdf")
         if self.plot is not None:
             check_installed("matplotlib")
+        if self.report is not None:
+            check_installed("matplotlib", "typst")
         if self.export_tool is not None and request.programme is not None:
             raise InputFault(PROGRAMME_ALONE)
+
+
+@dataclass(frozen=True, slots=True)
+class HolePaperRequest:
+    """What a report of a hole says that no record does."""
+
+    report_date: datetime | None
+    project: str
+    client: str
+    serial: str
+    calibration: str
+    books: PaperRequest
+
+    def to_pdf(self, answer: SurveyAnswer) -> bytes:
+        """The report; errors as ``report_pdf``, and InputFault."""
+        from groundstation.report.document import Origin, report_pdf
+        from groundstation.report.hole_report import HolePapers, hole_report
+
+        file, day = answer.request.file, (self.report_date or datetime.now(UTC)).date()
+        inputs = []
+        if file.is_file():
+            inputs.append((f"SHA-256 of {file.name}", hashlib.sha256(file.read_bytes()).hexdigest()))
+        papers = HolePapers(self.project, self.serial, self.calibration)
+        origin = Origin(day, __version__, inputs, self.books.to_papers(self.client))
+        return report_pdf(hole_report(answer, papers, origin))
 
 
 def list_tools(context: click.Context, _option: click.Parameter, value: bool) -> None:
@@ -193,6 +230,13 @@ survey_options = gather_options(
     click.option(
         "--section-azimuth-deg", type=float, default=0.0, show_default=True, help="Azimuth of the vertical section."
     ),
+    click.option("--report", type=click.Path(path_type=Path, dir_okay=False), help="Report to be signed, a .pdf file."),
+    click.option("--report-date", type=click.DateTime(["%Y-%m-%d"]), help="Day of the report.  [default: today, UTC]"),
+    click.option("--project", default="", help="For --report."),
+    click.option("--client", default="", help="For --report."),
+    click.option("--serial", default="", help="Serial number of what surveyed, for --report."),
+    click.option("--calibration", default="", help="Its certificate, for --report."),
+    *paper_options(),
     *site_options("Magnetic field of the site, for magnetic tools.", "Azimuth of magnetic north from true north."),
     click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Station table, a .csv file."),
     click.option(
@@ -212,4 +256,6 @@ survey_options = gather_options(
     frame=FrameRequest,
     request=SurveyRequest,
     files=SurveyFiles,
+    books=PaperRequest,
+    paper=HolePaperRequest,
 )

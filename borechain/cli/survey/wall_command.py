@@ -14,6 +14,7 @@ import click
 from borechain import __version__
 from borechain.cli.console_tables import show_warnings, table_console
 from borechain.cli.faults import InputFault, plain_faults
+from borechain.cli.report_options import PaperRequest, paper_options
 from borechain.cli.shared_options import json_option
 from borechain.cli.whole_files import PLOT_FORMATS, check_suffix, write_whole
 from telemetry.runtime.command_line import check_installed
@@ -59,7 +60,9 @@ wall_options = gather_options(
     click.option("--report", type=click.Path(path_type=Path, dir_okay=False), help="Report to be signed, a .pdf file."),
     click.option("--column", metavar="NAME", help="Column that --report is about; without it, the whole wall."),
     click.option("--date", type=click.DateTime(["%Y-%m-%d"]), help="Day of the report.  [default: today, UTC]"),
+    *paper_options(),
     files=WallFiles,
+    books=PaperRequest,
 )
 
 
@@ -68,7 +71,7 @@ wall_options = gather_options(
 @json_option
 @click.pass_context
 @plain_faults
-def wall(context: click.Context, file: Path, files: WallFiles, as_json: bool) -> None:
+def wall(context: click.Context, file: Path, files: WallFiles, books: PaperRequest, as_json: bool) -> None:
     """Judge the wall, shaft or grid in FILE: every joint, every void, what is missing or not surveyed, and the whole.
 
     The exit status is 0 when it is tight and 3 when it is not, or not proven to be.
@@ -84,7 +87,7 @@ def wall(context: click.Context, file: Path, files: WallFiles, as_json: bool) ->
     files.check()
     judged = api.wall(file)
     result = judged.to_result()
-    write_wall_files(judged, files)
+    write_wall_files(judged, files, books)
     if as_json:
         click.echo(json.dumps(result))
     else:
@@ -93,7 +96,7 @@ def wall(context: click.Context, file: Path, files: WallFiles, as_json: bool) ->
         context.exit(NOT_TIGHT)
 
 
-def write_wall_files(judged: JudgedWall, files: WallFiles) -> None:
+def write_wall_files(judged: JudgedWall, files: WallFiles, books: PaperRequest) -> None:
     """Write what is asked for: picture, report."""
     if files.plot is not None:
         from groundstation.report.plots_wall import draw_wall
@@ -104,7 +107,10 @@ def write_wall_files(judged: JudgedWall, files: WallFiles) -> None:
         from groundstation.report.wall_report import wall_report_pdf
 
         day = (files.date or datetime.now(UTC)).date()
-        write_whole(files.report, wall_report_pdf(judged.wall, judged.judgement, files.column, day, __version__))
+        papers = books.to_papers(judged.wall.file.client)
+        write_whole(
+            files.report, wall_report_pdf(judged.wall, judged.judgement, files.column, day, __version__, papers)
+        )
 
 
 def show_wall(result: dict[str, Any]) -> None:

@@ -1,0 +1,191 @@
+"""Reports in other languages: every phrase is in the tables of words, names stay, page 1 says what it has to."""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from forked_commands import run
+from test_reports import DAY, write_wall
+
+from borechain import api
+from borechain.cli.report_options import LANGUAGES
+from groundstation.errors import SurveyError
+from groundstation.report.calibrations.calibration_request import AttitudesRequest, TurntableRequest
+from groundstation.report.certificate import Identity, template_data, typeset_png_pages
+from groundstation.report.column_report import column_report
+from groundstation.report.document import Document, Origin, ReportPapers, document_content, report_pages, report_pdf
+from groundstation.report.hole_report import HolePapers, hole_report
+from groundstation.report.wall_report import column_records, site_of, wall_report
+from groundstation.report.word_tables import known_languages, word_table
+from groundstation.survey.requests.survey_request import SurveyRequest
+from groundstation.survey.wall.judged_wall import judge_wall
+from groundstation.survey.wall.wall_file import read_wall
+
+pytestmark = pytest.mark.slow
+OTHERS = [language for language in LANGUAGES if language != "en"]
+SHOWN = ("P01", "P03", "P06", "P10", "P15")
+DATA = Path(__file__).parents[1] / "data" / "calibration"
+# what is the same in another language, names of the test, and names of models, methods and sources
+SAME = {
+    "de": "Revision Software sigma", "fr": "Document Site Joints joint Date vertical source Stations attitude sigma",
+}  # fmt: skip
+NAMES = {
+    "North pit wall", "Station square, lot 3", "Bohr and Sons", "City railways", "Station to Station",
+    "minimum-curvature", "relay", "relay: Chain of low-cost nodes with relayed yaw, calibrated", "R-17",
+    "Tube 7", "wall",
+    "calibration, Allan analysis and the filter's own variances, station by station",
+}  # fmt: skip
+UNITS = r"[\W\d_]*(\b(m|mm|deg|azi|incl|N|E|s|MD|sigma)\b[\W\d_]*)*"
+NO_WORD = re.compile(UNITS + r"|[0-9a-f]{64}|[A-Z]+(-[A-Z]+)?|[PRKD]-?\d+.*|[\d.]+ .{1,5}|[-+−]?[xyz]|[\d.e−-]+")
+
+
+def origin_in(language: str) -> Origin:
+    papers = ReportPapers("D-17", "B", "Bohr and Sons", "City railways", language)
+    return Origin(DAY, "1.2.3", [("SHA-256 of wall.toml", "ab" * 32)], papers)
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("hole") / "K7.csv"
+    path.write_text("MD (m),Inc (deg),Azi (deg),time_s\n0,0,0,10\n10,1,120,200\n20,3,125,390\n30,3.5,124,580\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, record: Path) -> Any:
+    """A wall of 20, five of its columns and a hole, in any language."""
+    wall = read_wall(write_wall(tmp_path_factory.mktemp("wall")))
+    judgement, answer = judge_wall(wall), api.answer_survey(SurveyRequest(record))
+
+    def documents(language: str) -> list[Document]:
+        origin = origin_in(language)
+        records = [
+            one for one in column_records(wall, judgement) if one.design.name in ("P01", "P03", "P06", "P10", "P15")
+        ]
+        columns = [column_report(one, site_of(wall), origin) for one in records]
+        papers = HolePapers("Station to Station", "R-17", "")
+        return [wall_report(wall, judgement, origin), *columns, hole_report(answer, papers, origin)]
+
+    return documents
+
+
+def certificates(language: str) -> Iterator[dict[str, Any]]:
+    for request in (
+        AttitudesRequest(DATA / "calibration_vn100_accel.csv"),
+        TurntableRequest(DATA / "calibration_node_a1_gyro.csv", reference=720.0),
+    ):
+        found = api.calibrate(request, DAY)
+        papers = (("Certificate", "K-17"), ("Serial number", "R-17"), ("Next due", "2027-11-20"))
+        identity = Identity("Tube 7", DAY, "r.csv", found.record_sha256, found.block_sha256, "1", papers, language)
+        yield json.loads(template_data(found.sheet, found.panels(), identity))
+
+
+def texts(content: Any) -> Iterator[str]:
+    """Every text that is set but for software, pictures and file names."""
+    if isinstance(content, str):
+        yield content
+    elif isinstance(content, list | tuple):
+        for part in content:
+            yield from texts(part)
+    elif isinstance(content, dict):
+        for name, part in content.items():
+            if name not in ("software", "svg", "figure", "language", "logo", "record", "day"):
+                yield from texts(part)
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_no_english_phrase_is_left(made: Any, language: str) -> None:
+    english = [text for one in made("en") for text in texts(document_content(one))]
+    other = [text for one in made(language) for text in texts(document_content(one))]
+    english += [text for one in certificates("en") for text in texts(one)]
+    other += [text for one in certificates(language) for text in texts(one)]
+    assert len(english) == len(other)
+    left = {a for a, b in zip(english, other, strict=True) if a == b} - NAMES - set(SAME[language].split())
+    assert {text for text in left if not NO_WORD.fullmatch(text)} == set()
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_numbers_stay_as_they_are(made: Any, language: str) -> None:
+    for one, other in zip(made("en"), made(language), strict=True):
+        pairs = zip(texts(document_content(one)), texts(document_content(other)), strict=True)
+        for a, b in pairs:
+            assert sorted(re.findall(r"-?\d[\d.]*\d|\d", a)) == sorted(re.findall(r"-?\d[\d.]*\d|\d", b)), (a, b)
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_names_of_people_stay_as_they_are(made: Any, language: str) -> None:
+    content = document_content(made(language)[-1])
+    shown = [text for _, text in content["facts"]]
+    assert {"Bohr and Sons", "City railways", "Station to Station", "D-17", "B"} <= set(shown)
+    assert content["subject"] == "Station to Station"
+
+
+def test_the_first_page_says_what_is_not_stated_and_what_the_sigma_holds(made: Any) -> None:
+    wall, column, *_, hole = (dict(document_content(one)["facts"]) for one in made("en"))
+    for facts in (wall, column, hole):
+        assert (facts["Document"], facts["Revision"], facts["Contractor"]) == ("D-17", "B", "Bohr and Sons")
+    assert wall["Serial and calibration of the instruments"] == "stated of all 19 columns that were surveyed"
+    assert column["Serial and calibration of the instruments"] == "R-17 / R-17/2026-031"
+    assert wall["Site"] == "gravity 9.81000 m/s^2"
+    assert "no mistakes" in wall["What the ± contains"]
+    assert hole["Times of the surveys"] == "10 to 580 s of its record"
+    assert hole["Site"].startswith("gravity 9.81000 m/s^2 (default); latitude 52 deg")
+
+
+def test_a_hole_has_a_report_of_its_own(made: Any) -> None:
+    hole = made("en")[-1]
+    found = re.fullmatch(
+        r"The hole ends at 30 m: north (\S+) ± (\S+) m, east (\S+) ± (\S+) m, down (\S+) ± (\S+) m, 95 % each",
+        hole.verdict,
+    )
+    assert found
+    north, east, down = (float(found[k]) for k in (1, 3, 5))
+    assert (north, east) == (pytest.approx(-0.558, abs=2e-3), pytest.approx(0.833, abs=2e-3))
+    assert down < 30.0
+    sections = {section.title: section for section in hole.sections}
+    assert dict(sections["Instrument"].facts)["Calibration"] == "not stated"
+    assert [row[0] for row in sections["Stations"].rows] == ["0.00", "10.00", "20.00", "30.00"]
+    assert hole.good
+
+
+def test_a_warning_stands_on_the_report_of_a_hole(tmp_path: Path) -> None:
+    path = tmp_path / "typed.csv"
+    path.write_text("md_m,inclination_deg,azimuth_deg\n0,0,0\n10,1,120\n20,30,120\n30,1,120\n")
+    document = hole_report(api.answer_survey(SurveyRequest(path)), HolePapers(), origin_in("en"))
+    assert not document.good
+    assert re.search(r"warnings: [1-9]", document.verdict)
+    check = next(section for section in document.sections if section.title == "Check of the data")
+    assert any("20 m" in line for line in check.words)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_report_is_set_and_alike_twice(made: Any, language: str) -> None:
+    hole = made(language)[-1]
+    assert report_pdf(hole) == report_pdf(hole)
+    assert len(report_pages(hole, 20.0)) == 2
+    for content in certificates(language):
+        assert len(typeset_png_pages(json.dumps(content), DAY, 20.0)) >= 1
+
+
+def test_the_tables_have_the_phrases_of_each_other() -> None:
+    assert known_languages() == sorted(LANGUAGES)
+    tables = [word_table(language) for language in OTHERS]
+    known = [{*table._exact, *(pattern.pattern for pattern, _ in table._patterns)} for table in tables]
+    assert all(words == known[0] for words in known)
+    with pytest.raises(SurveyError, match="--language: expected one of de, en, fr, got 'xx'"):
+        word_table("xx")
+
+
+def test_the_command_writes_a_report_of_a_hole(tmp_path: Path, record: Path) -> None:
+    logo = tmp_path / "logo.svg"
+    logo.write_text('<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"><circle cx="4" cy="4" r="3"/></svg>')
+    words = ("survey", record, "--report", tmp_path / "K7.pdf", "--report-date", "2026-11-20", "--language", "de")
+    done = run(*words, "--document", "D-17", "--contractor", "Bohr AG", "--logo", logo)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "K7.pdf").read_bytes().startswith(b"%PDF-")
+    wrong = run(*words, "--logo", record)
+    assert (wrong.returncode, "--logo" in wrong.stderr) == (2, True)
+    assert run("survey", record, "--report", tmp_path / "K7.txt").returncode == 2
