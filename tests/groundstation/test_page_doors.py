@@ -165,6 +165,9 @@ def test_a_person_signs_in_with_a_password_of_its_own_and_is_out_when_it_is_take
             while stream.recv(65_536):  # it ends
                 pass
         assert ben.get("/api/session").content["name"] == "ben"
+        file.write_text(text_of(book | {"driller": hash_of("a new word for all")}))
+        assert ben.get("/api/session").content["role"] is None  # his was of the word before
+        assert ben.sign_in("driller", "a new word for all", "ben").status == 200
         file.write_text("driller plain\n")
         assert ben.get("/api/session").content["role"] is None
         told = ben.post("/api/session", {"role": "driller", "name": "ben", "password": PASSWORD})
