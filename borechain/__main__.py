@@ -36,6 +36,7 @@ COMMANDS = {
         "Record what a rig takes in and says into a file (MCAP).",
     ),
     "replay": ("borechain.cli.ground.record_command", "replay", "Give a recording to a ground station again."),
+    "merge": ("borechain.cli.ground.merge_command", "merge", "Merge the databases of two ground stations of one rig."),
     "calibrate": (
         "borechain.cli.calibrate.calibrate",
         "calibrate",

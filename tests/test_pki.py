@@ -14,7 +14,15 @@ from sealed_string import NOW, make_folder
 
 from borechain.cli.pki.pki import pki
 from borechain.pki.access import read_access
-from borechain.pki.rig_keys import add_tube, init_rig, read_secret, revoke_tube, rotate_keys, tubes_of
+from borechain.pki.rig_keys import (
+    add_tube,
+    init_rig,
+    read_secret,
+    renew_certificate,
+    revoke_tube,
+    rotate_keys,
+    tubes_of,
+)
 from groundstation.gateway.page.passwords import is_right, read_passwords
 from telemetry.application.seals import Keys, seals_of
 from telemetry.errors import KeyFileError
@@ -269,6 +277,18 @@ def test_who_comes_back_has_another_name_at_the_router_for_ever(folder: Path) ->
     revoke_tube(folder, 1, NOW)
     assert not [name for name in let_in(folder) if name.startswith("anna")]
     assert "expected one of" in run(folder, "renew", "anna").output
+
+
+def test_what_is_renewed_is_good_for_as_long_as_what_was_made(folder: Path) -> None:
+    def end_of(name: str) -> datetime.datetime:
+        return x509.load_pem_x509_certificate((folder / f"{name}.pem").read_bytes()).not_valid_after_utc
+
+    later = NOW + datetime.timedelta(days=100)
+    for name in ("router", "medium", "base", "tube-1", "driller"):
+        before, key = end_of(name), (folder / f"{name}.key").read_bytes()
+        renew_certificate(folder, name, later)
+        assert end_of(name) - before == later - NOW
+        assert (folder / f"{name}.key").read_bytes() != key
 
 
 @pytest.mark.parametrize(

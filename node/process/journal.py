@@ -70,7 +70,8 @@ class Journal:
                     best, self._newest = found, place
             self._there.add(place)
         if best is not None:
-            self._generation, self.carried = max(self._generation, best.generation), best.carried
+            self._generation = max(self._generation, best.generation)
+            self.carried = best.carried
             return best.nodes, best.blob
         if faults:
             raise SavedStateError("; ".join(f"{fault} ({', '.join(names)})" for fault, names in faults.items()))

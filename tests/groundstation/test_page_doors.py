@@ -165,6 +165,9 @@ def test_a_person_signs_in_with_a_password_of_its_own_and_is_out_when_it_is_take
             while stream.recv(65_536):  # it ends
                 pass
         assert ben.get("/api/session").content["name"] == "ben"
+        file.write_text(text_of(book | {"driller": hash_of("a new word for all")}))
+        assert ben.get("/api/session").content["role"] is None  # his was of the word before
+        assert ben.sign_in("driller", "a new word for all", "ben").status == 200
         file.write_text("driller plain\n")
         assert ben.get("/api/session").content["role"] is None
         told = ben.post("/api/session", {"role": "driller", "name": "ben", "password": PASSWORD})
@@ -232,3 +235,27 @@ def test_one_more_connection_finds_a_place_and_nobody_who_is_signed_in_gives_way
         there = [one for one in there if one not in gone]
         assert len(there) <= CONNECTIONS
         assert sum(one.client[0] == of and one.client not in signed for one in there) <= OF_ONE_ADDRESS
+
+
+@pytest.mark.parametrize(("busy", "gone"), [(set(), 0), ({0, 1, 5}, 2), (set(range(OF_ONE_ADDRESS)), 0)])
+def test_the_oldest_without_a_request_gives_way_and_then_the_oldest_with_one(busy: set[int], gone: int) -> None:
+    there = [Connected(("a", number), number, number in busy) for number in range(OF_ONE_ADDRESS)]
+    fresh = Connected(("a", 1000), 1000)
+    there.append(fresh)
+    ended = those_to_end(there, fresh, SignedPeers())  # type: ignore[arg-type, type-var]
+    assert [one.opened for one in ended] == [gone]  # type: ignore[comparison-overlap]
+
+
+def test_who_waits_behind_a_wrong_password_is_held_by_it(tmp_path: Path, passwords: dict[str, str]) -> None:
+    """Ten tries at once, each sent before any is answered: not one a hash."""
+    rig, port = Rig(tmp_path, target=20.0), free_port()
+    body = b'{"role": "driller", "name": "anna", "password": "not the password"}'
+    kind = f"Content-Type: application/json\r\nContent-Length: {len(body)}"
+    head = f"POST /api/session HTTP/1.1\r\nHost: 127.0.0.1\r\n{kind}"
+    with serving(rig, PageSettings("127.0.0.1", port, passwords=passwords)), contextlib.ExitStack() as held:
+        tries = [held.enter_context(socket.create_connection(("127.0.0.1", port), 60.0)) for _ in range(10)]
+        for one in tries:
+            one.sendall(f"{head}\r\n\r\n".encode() + body)
+        statuses = [one.recv(65_536).split()[1] for one in tries]
+    assert set(statuses) == {b"401", b"429"}
+    assert statuses.count(b"401") <= 2
