@@ -81,4 +81,4 @@ def page_settings(asked: PageRequest) -> PageSettings | None:
     certificate, key = tls or (None, None)
     if certificate is not None and key is not None:
         check_certificate(certificate, key)
-    return PageSettings(host, port, certificate, key, {} if passwords is None else read_passwords(passwords))
+    return PageSettings(host, port, certificate, key, {} if passwords is None else read_passwords(passwords), passwords)

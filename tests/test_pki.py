@@ -20,6 +20,7 @@ from telemetry.application.seals import Keys, seals_of
 from telemetry.errors import KeyFileError
 from telemetry.media.credentials import DEPTH_SOURCE, credentials_for, credentials_of, file_name, needs_tls
 from telemetry.messages import BASE, ENCODER, Side
+from telemetry.transport.certificate_dates import certificate_trouble
 from telemetry.transport.key_ring import key_file, read_ring
 
 SECRETS = (".keys", ".key", ".secret")
@@ -199,13 +200,117 @@ def test_both_ends_of_a_joint_and_both_ends_of_a_string_have_the_same_key(folder
 
 
 def test_certificates_name_their_holder_and_say_what_for(folder: Path) -> None:
-    for name, purpose in (("router", "serverAuth"), ("tube-1", "clientAuth"), ("driller", "clientAuth")):
+    day = datetime.timedelta(days=1)
+    for name, purpose, least, most in (
+        ("router", "serverAuth", 700, 800),
+        ("base", "clientAuth", 700, 800),
+        ("tube-1", "clientAuth", 20 * 365, 31 * 365),  # no stick reaches it in the hole
+        ("driller", "clientAuth", 150, 200),
+    ):
         certificate = x509.load_pem_x509_certificate((folder / f"{name}.pem").read_bytes())
         assert [a.value for a in certificate.subject] == [name]
         (use,) = certificate.extensions.get_extension_for_class(x509.ExtendedKeyUsage).value
         assert use._name == purpose
         certificate.verify_directly_issued_by(x509.load_pem_x509_certificate((folder / "ca.pem").read_bytes()))
-        assert certificate.not_valid_after_utc - NOW > datetime.timedelta(days=20 * 365)
+        assert least * day < certificate.not_valid_after_utc - NOW < most * day
+
+
+def let_in(folder: Path) -> dict[str, set[str]]:
+    """Messages that each common name may send, as the router's rules say."""
+    found = read_access(folder)
+    rules = {rule["id"]: rule for rule in found["rules"]}
+    names = {one["id"]: one["cert_common_names"] for one in found["subjects"]}
+    return {
+        name: {
+            f"{key} {message}"
+            for rule in policy["rules"]
+            if "ingress" in rules[rule]["flows"]
+            for key in rules[rule]["key_exprs"]
+            for message in rules[rule]["messages"]
+        }
+        for policy in found["policies"]
+        for subject in policy["subjects"]
+        for name in names[subject]
+    }
+
+
+def common_name_of(path: Path) -> str:
+    (name,) = x509.load_pem_x509_certificate(path.read_bytes()).subject
+    return str(name.value)
+
+
+def test_a_person_has_a_certificate_and_rights_of_its_own_until_it_is_revoked_by_name(folder: Path) -> None:
+    tubes = {path.name: path.read_bytes() for path in folder.glob("*.keys")}
+    assert run(folder, "person", "anna", "--role", "driller").output == f"{folder / 'anna.pem'}\n"
+    assert run(folder, "person", "otto", "--role", "operator").exit_code == 0
+    rights = let_in(folder)
+    assert rights["anna"] == rights["driller"] != rights["otto"] == rights["operator"]
+    assert [name for name, may in rights.items() if any("/cmd/" in one and one.endswith(" query") for one in may)] == [
+        "driller", "anna",
+    ]  # fmt: skip
+    assert "take" in run(folder, "revoke", "anna").output
+    assert "anna" not in let_in(folder)
+    assert set(let_in(folder)) == set(rights) - {"anna"}
+    assert not list(folder.glob("anna.*"))
+    assert {path.name: path.read_bytes() for path in folder.glob("*.keys")} == tubes  # no tube in the hole is touched
+
+
+def test_who_comes_back_has_another_name_at_the_router_for_ever(folder: Path) -> None:
+    seen = []
+    for _ in range(3):
+        assert run(folder, "person", "anna", "--role", "driller").exit_code == 0
+        seen.append(common_name_of(folder / "anna.pem"))
+        assert [name for name in let_in(folder) if name.startswith("anna")] == seen[-1:]
+        assert run(folder, "renew", "anna").exit_code == 0
+        assert common_name_of(folder / "anna.pem") == seen[-1]
+        assert run(folder, "revoke", "anna").exit_code == 0
+    assert len(set(seen)) == 3
+    rotate_keys(folder, NOW)
+    revoke_tube(folder, 1, NOW)
+    assert not [name for name in let_in(folder) if name.startswith("anna")]
+    assert "expected one of" in run(folder, "renew", "anna").output
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("person", "router", "--role", "driller"), "that no process has"),
+        (("person", "tube-3", "--role", "driller"), "that no process has"),
+        (("person", "17", "--role", "driller"), "letters"),
+        (("person", "an.na", "--role", "driller"), "letters"),
+        (("person", "../anna", "--role", "driller"), "letters"),
+        (("person", "driller", "--role", "operator"), "expected the role driller that it has"),
+        (("revoke", "carla"), "expected a tube's number or one of driller, operator"),
+        (("renew", "tube-9"), "expected one of router, medium, base, encoder, depth, tube-1, tube-2"),
+    ],
+)
+def test_a_name_that_cannot_be_is_refused_in_a_line(folder: Path, words: tuple[str, ...], named: str) -> None:
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    done = run(folder, *words)
+    assert (done.exit_code, "Traceback" in done.output) == (2, False)
+    assert named in " ".join(done.output.split())
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_a_folder_from_before_there_were_persons_is_read_and_its_roles_can_be_revoked(folder: Path) -> None:
+    path = folder / "rig.secret"
+    path.write_text(path.read_text().partition("\n[[person]]")[0])
+    assert run(folder, "revoke", "driller").exit_code == 0
+    assert {"operator", "base"} < set(let_in(folder))
+    assert "driller" not in let_in(folder)
+
+
+@pytest.mark.parametrize(
+    ("days", "said"),
+    [(0, ""), (152, ""), (154, "ends in 29 days"), (182, "ends in 1 days"), (184, "has ended"), (-2, "in the future")],
+)
+def test_a_certificate_is_told_of_a_month_before_its_end_and_of_tomorrow(folder: Path, days: int, said: str) -> None:
+    trouble = certificate_trouble(folder / "driller.pem", NOW + datetime.timedelta(days=days))
+    assert said in trouble
+    assert bool(trouble) == bool(said)
+    assert ("pki renew driller" in trouble) == ("end" in said)
+    (folder / "driller.pem").write_text("none")
+    assert "expected a certificate" in certificate_trouble(folder / "driller.pem", NOW)
 
 
 def test_a_revoked_tube_has_no_rights_at_the_router(folder: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import queue
 import sys
 import warnings
 from collections.abc import Callable
@@ -20,7 +19,7 @@ from telemetry import keys
 from telemetry.media.credentials import Credentials, credentials_for
 from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
 from telemetry.media.zenoh_port import CONNECT_TIMEOUT
-from telemetry.runtime.hosting import Place, begin_process, on_termination, reporting_errors
+from telemetry.runtime.hosting import Place, begin_process, on_termination, reporting_errors, write_warning
 
 SAY_EVERY = 10.0  # wall s, of who is waited for
 
@@ -73,7 +72,10 @@ def run_medium(
             scheduler = Scheduler(world, stepper, tell, speed, cued=cued, seal_depth=seal_depth, absent=absent)
             on_termination(scheduler.stop)
             with contextlib.closing(stepper):
-                if scheduler.run():
+                is_whole = scheduler.run()
+                if stepper.foreign:
+                    write_warning("medium", f"{stepper.foreign} frames that no process of the rig sent were dropped")
+                if is_whole:
                     scheduler.linger()
 
 
@@ -99,15 +101,6 @@ def guard_of(endpoint: str, place: Path | None) -> tuple[Credentials | None, dic
     """What a router shows over TLS and whom it lets do what; nothing of both without TLS."""
     credentials = credentials_for(endpoint, place, ROUTER)
     return credentials, None if credentials is None else read_access(credentials.authority.parent)
-
-
-def run_router(endpoint: str, keys_place: Path | None = None) -> None:
-    """Be the router that the processes of a rig meet at, until a signal comes."""
-    stopped: queue.SimpleQueue[None] = queue.SimpleQueue()
-    begin_process("router")
-    with opened_router(endpoint, keys_place):
-        on_termination(lambda: stopped.put(None))
-        stopped.get()
 
 
 def opened_router(endpoint: str, keys_place: Path | None = None) -> AbstractContextManager[ZenohBus]:

@@ -17,7 +17,7 @@ from node.process.tube_process import TubeProcess
 from sim.errors import RigError
 from sim.gauntlet.fault import EVERYBODY, Step
 from sim.gauntlet.faulty_channel import FaultyChannel
-from sim.gauntlet.faulty_disk import FaultyDisk
+from sim.gauntlet.faulty_disk import FaultyDisk, PowerCutError
 from sim.gauntlet.faulty_stepper import FaultyStepper
 from sim.gauntlet.faulty_world import DRILLED_IN, MINUTE, TUBE_LENGTH, FaultyWorld
 from sim.rig.scheduler import Scheduler
@@ -155,11 +155,13 @@ class GauntletRig:
             self.ground.on_depth(payload, self.world.local_clock(BASE, self.now))
 
     def order(self, name: str, parameters: dict[str, str]) -> bool:
-        """Have the crew order something; returns whether the ground station obeyed."""
+        """Have the crew order something; returns whether the ground station may have obeyed."""
         if self.ground is None:
             return False
         try:
             self.inline.command(name, parameters)
+        except PowerCutError:
+            self.cut(BASE)  # while it wrote the order down, which stands in its book or does not
         except RigError:
             return False  # a disk that refuses, or what it was told cannot be now
         return True

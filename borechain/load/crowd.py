@@ -14,6 +14,7 @@ from node.kernels.arithmetic.formats import PERIOD
 from telemetry import keys
 from telemetry.application.depth_source import DepthSource
 from telemetry.application.endpoint import Endpoint
+from telemetry.application.seals import Seals
 from telemetry.media.neighbours import neighbour_ports
 from telemetry.media.zenoh_bus import ZenohBus
 from telemetry.media.zenoh_port import ZenohMedium
@@ -52,10 +53,11 @@ class Crowd(Process):
     tubes : in the hole
     bus, rig : where the depth of the bit is told
     speed : m/s, of the bit while it drills; 0 tells no depth and surveys nothing
+    seals : of the encoder, where the rig has keys
     """
 
-    def __init__(self, tubes: int, bus: ZenohBus, rig: str, speed: float = 0.0) -> None:
-        self.endpoint = Endpoint(ENCODER, frozenset({Side.UPPER}), boot_count=1, is_clock_root=True)
+    def __init__(self, tubes: int, bus: ZenohBus, rig: str, speed: float = 0.0, seals: Seals | None = None) -> None:
+        self.endpoint = Endpoint(ENCODER, frozenset({Side.UPPER}), boot_count=1, is_clock_root=True, seals=seals)
         self.tubes, self.speed = tubes, speed
         self.surveys = self.events = 0  # handed over so far
         self._depth = bus.publisher(keys.DEPTH.format(rig=rig))

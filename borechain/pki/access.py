@@ -1,5 +1,7 @@
 """Who may do what at the router: zenoh's access control, by the common name of a client's certificate.
 
+A process is known by its own name; a person by a name of its own, which stands here for a role.
+
 What no rule allows is denied. A process writes its own port and nothing else, hears the ports of others, since the
 order of a string is found, and takes its steps where a stepper drives it. All tubes that there can be are listed at
 once, so one that comes later needs no restart of the router.
@@ -8,7 +10,7 @@ once, so one that comes later needs no restart of the router.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +25,6 @@ ACCESS_FILE = "access.json"
 OPERATOR = "operator"  # reads what the ground station serves
 DRILLER = "driller"  # an operator who may order
 MEDIUM = "medium"  # the simulated world: it joins the ports of all
-ROLES = (OPERATOR, DRILLER, MEDIUM)
 TOKEN = "borechain/{rig}/@liveliness/"
 LEASES = "borechain/{rig}/@lease/*"
 
@@ -46,7 +47,7 @@ class Grant:
 
 
 def grants_of(rig: str, subject: str) -> list[Grant]:
-    """Everything that the holder of a certificate may do; ``subject`` is its common name."""
+    """Everything that the holder of a certificate may do; ``subject`` is a process, or the role of a person."""
     ground = keys.GROUND.format(rig=rig, path="**")
     # a query need not name the rig: the authority, and so the router, is that of one rig
     ground_of_any, command_of_any = keys.GROUND.format(rig="*", path="**"), keys.COMMAND.format(rig="*", name="**")
@@ -86,18 +87,19 @@ def grants_of(rig: str, subject: str) -> list[Grant]:
     return grants
 
 
-def common_names(revoked: Iterable[int] = ()) -> list[str]:
-    """Common names that the router knows."""
+def subjects_of(persons: Mapping[str, str], revoked: Iterable[int] = ()) -> dict[str, str]:
+    """What each common name that the router knows is let in as: a process as itself, a person by its role."""
     tubes = [f"tube-{tube}" for tube in range(1, MAX_TUBE + 1) if tube not in set(revoked)]
-    return ["base", "encoder", "depth", *ROLES, *tubes]
+    processes = ["base", "encoder", "depth", MEDIUM, *tubes]
+    return dict(persons) | dict(zip(processes, processes, strict=True))
 
 
-def access_control(rig: str, names: Sequence[str]) -> dict[str, Any]:
-    """The value of zenoh's ``access_control`` for the holders of certificates with these names."""
+def access_control(rig: str, subjects: Mapping[str, str]) -> dict[str, Any]:
+    """The value of zenoh's ``access_control``; ``subjects`` as of ``subjects_of``."""
     rules, policies = [], []
-    for name in names:
+    for name, subject in subjects.items():
         ids = []
-        for number, grant in enumerate(grants_of(rig, name)):
+        for number, grant in enumerate(grants_of(rig, subject)):
             what, comes, goes = grant.way
             for flow, messages in (("ingress", comes), ("egress", goes)):
                 if messages:
@@ -116,12 +118,12 @@ def access_control(rig: str, names: Sequence[str]) -> dict[str, Any]:
         "enabled": True,
         "default_permission": "deny",
         "rules": rules,
-        "subjects": [{"id": name, "cert_common_names": [name]} for name in names],
+        "subjects": [{"id": name, "cert_common_names": [name]} for name in subjects],
         "policies": policies,
     }
 
 
-def write_access(folder: Path, rig: str, revoked: Iterable[int]) -> None:
+def write_access(folder: Path, rig: str, persons: Mapping[str, str], revoked: Iterable[int]) -> None:
     """Write the access rules of a rig's router, as a part of its configuration.
 
     Raises
@@ -129,7 +131,7 @@ def write_access(folder: Path, rig: str, revoked: Iterable[int]) -> None:
     KeyFileError
         When it cannot be written.
     """
-    settings = {"access_control": access_control(rig, common_names(revoked))}
+    settings = {"access_control": access_control(rig, subjects_of(persons, revoked))}
     write_file(folder / ACCESS_FILE, json.dumps(settings, indent=1) + "\n")
 
 

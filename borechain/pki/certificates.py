@@ -1,7 +1,9 @@
 """Certificates of a rig: an authority of its own, and one certificate for each process and role.
 
-They name the process that connects, for the router's access control, and keep all others from reading. They end after
-30 years: none expires in the middle of a hole. A revoked process gets no rights from the router (``access``).
+They name who connects, for the router's access control, and keep all others from reading. A person's ends after half a
+year, that of a process at the surface after two; both are warned of a month before, and made anew while the rig drills.
+A tube's ends after 30 years: none expires in the middle of a hole. Who is revoked gets no rights from the router
+(``access``), however long its certificate is good.
 """
 
 from __future__ import annotations
@@ -20,8 +22,11 @@ from telemetry.errors import KeyFileError
 from telemetry.media.credentials import CA_FILE
 
 CA_KEY = "ca.key"
-VALID = datetime.timedelta(days=30 * 365)
-EARLIER = datetime.timedelta(days=1)  # for a board whose clock is late
+DAY = datetime.timedelta(days=1)
+VALID = 30 * 365 * DAY  # of the authority, and of tubes, which no stick reaches in the hole
+AT_THE_SURFACE = 2 * 365 * DAY  # of a process that can be reached
+OF_A_PERSON = 183 * DAY
+EARLIER = DAY  # for a board whose clock is late
 
 
 def make_authority(folder: Path, rig: str, now: datetime.datetime) -> None:
@@ -46,7 +51,7 @@ def make_authority(folder: Path, rig: str, now: datetime.datetime) -> None:
         decipher_only=False,
     )
     certificate = (
-        _builder(name, name, key, now)
+        _builder(name, name, key, now, VALID)
         .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
         .add_extension(usage, critical=True)
         .sign(key, hashes.SHA256())
@@ -55,10 +60,17 @@ def make_authority(folder: Path, rig: str, now: datetime.datetime) -> None:
     write_file(folder / CA_FILE, certificate.public_bytes(serialization.Encoding.PEM).decode())
 
 
-def make_certificate(folder: Path, name: str, now: datetime.datetime) -> None:
-    """Make key and certificate of a process or a role, ``name.key`` and ``name.pem``.
+def make_certificate(
+    folder: Path,
+    name: str,
+    now: datetime.datetime,
+    valid: datetime.timedelta = AT_THE_SURFACE,
+    common_name: str | None = None,
+) -> None:
+    """Make key and certificate of a process or a person, ``name.key`` and ``name.pem``, good for ``valid``.
 
-    Only the router's is good for listening: a stolen tube cannot pass for the router.
+    ``common_name`` is what the router knows it by, the name itself where it is not given. Only the
+    router's is good for listening: a stolen tube cannot pass for the router.
 
     Raises
     ------
@@ -73,7 +85,7 @@ def make_certificate(folder: Path, name: str, now: datetime.datetime) -> None:
     key = generate_private_key(SECP256R1())
     purpose = ExtendedKeyUsageOID.SERVER_AUTH if name == ROUTER else ExtendedKeyUsageOID.CLIENT_AUTH
     certificate = (
-        _builder(_name(name), authority.subject, key, now)
+        _builder(_name(common_name or name), authority.subject, key, now, valid)
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
         .add_extension(x509.SubjectAlternativeName([x509.DNSName(name)]), critical=False)
         .add_extension(x509.ExtendedKeyUsage([purpose]), critical=False)
@@ -88,7 +100,11 @@ def _name(common_name: str) -> x509.Name:
 
 
 def _builder(
-    subject: x509.Name, issuer: x509.Name, key: EllipticCurvePrivateKey, now: datetime.datetime
+    subject: x509.Name,
+    issuer: x509.Name,
+    key: EllipticCurvePrivateKey,
+    now: datetime.datetime,
+    valid: datetime.timedelta,
 ) -> x509.CertificateBuilder:
     return (
         x509.CertificateBuilder()
@@ -97,7 +113,7 @@ def _builder(
         .public_key(key.public_key())
         .serial_number(x509.random_serial_number())
         .not_valid_before(now - EARLIER)
-        .not_valid_after(now + VALID)
+        .not_valid_after(now + valid)
     )
 
 

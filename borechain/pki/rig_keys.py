@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from borechain.pki.access import ROLES, ROUTER, write_access
-from borechain.pki.certificates import make_authority, make_certificate
+from borechain.pki.access import MEDIUM, ROUTER, write_access
+from borechain.pki.certificates import AT_THE_SURFACE, OF_A_PERSON, VALID, make_authority, make_certificate
+from borechain.pki.persons import FIRST, Person, admitted_roles, person_lines, person_of, with_person, without_person
 from borechain.pki.private_files import write_private
 from telemetry.errors import KeyFileError
 from telemetry.media.credentials import DEPTH_SOURCE, file_name
@@ -35,6 +36,7 @@ SECRET_FILE = "rig.secret"
 SECRET_SIZE = 32  # bytes
 OVERLAP = datetime.timedelta(days=1)  # for which the old keys stay valid after a rotation
 ALWAYS = (BASE, ENCODER, DEPTH_SOURCE)  # processes that every rig has
+SURFACE = (ROUTER, MEDIUM, *map(file_name, ALWAYS))  # whose certificates every rig has
 NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
 
@@ -55,6 +57,7 @@ class RigSecret:
     rig: str
     generations: tuple[SecretGeneration, ...]  # the oldest first
     revoked: frozenset[int] = frozenset()
+    persons: tuple[Person, ...] = FIRST
 
     def ring(self, address: int) -> KeyRing:
         """Keys of a process; joint keys with those revoked are left out."""
@@ -88,8 +91,10 @@ def init_rig(
     except OSError as error:
         raise KeyFileError(f"folder {folder}: {error.strerror}") from error
     make_authority(folder, rig, now)
-    for name in (ROUTER, *ROLES, *map(file_name, ALWAYS)):
-        make_certificate(folder, name, now)
+    for name in SURFACE:
+        make_certificate(folder, name, now, AT_THE_SURFACE)
+    for person in secret.persons:
+        make_certificate(folder, person.name, now, OF_A_PERSON, person.common_name)
     _write(folder, secret, ALWAYS)
     return secret
 
@@ -109,7 +114,7 @@ def add_tube(folder: Path, tube: int, now: datetime.datetime) -> Path:
         raise KeyFileError(f"tube {tube}: its keys were revoked; expected another number for another tube")
     write_private(_file_of(folder, tube), pack_ring(secret.ring(tube)))
     if not (folder / f"{file_name(tube)}.key").exists():
-        make_certificate(folder, file_name(tube), now)
+        make_certificate(folder, file_name(tube), now, VALID)
     return _file_of(folder, tube)
 
 
@@ -127,6 +132,60 @@ def revoke_tube(folder: Path, tube: int, now: datetime.datetime) -> RigSecret:
     for suffix in (SUFFIX, ".pem", ".key"):
         (folder / f"{file_name(tube)}{suffix}").unlink(missing_ok=True)
     return _rotate(folder, replace(secret, revoked=secret.revoked | {tube}), now)
+
+
+def add_person(folder: Path, name: str, role: str, now: datetime.datetime) -> Path:
+    """Make the certificate of a person, and let it in; returns the file of the certificate.
+
+    Raises
+    ------
+    KeyFileError
+        When the folder holds no rig's keys, or the name cannot be.
+    """
+    secret = read_secret(folder)
+    named = replace(secret, persons=with_person(secret.persons, name, role))
+    (person,) = (one for one in named.persons if one.name == name)
+    make_certificate(folder, name, now, OF_A_PERSON, person.common_name)
+    _write(folder, named, ())
+    return folder / f"{name}.pem"
+
+
+def revoke_person(folder: Path, name: str) -> RigSecret:
+    """Shut a person out, for as long as its certificate may be good; no tube's keys change.
+
+    Raises
+    ------
+    KeyFileError
+        When the folder holds no rig's keys, or no person has this name.
+    """
+    secret = read_secret(folder)
+    shut = replace(secret, persons=without_person(secret.persons, name))
+    for suffix in (".pem", ".key"):
+        (folder / f"{name}{suffix}").unlink(missing_ok=True)
+    _write(folder, shut, ())
+    return shut
+
+
+def renew_certificate(folder: Path, name: str, now: datetime.datetime) -> Path:
+    """Make a certificate anew, and the key with it; the one of before is good until its end.
+
+    Raises
+    ------
+    KeyFileError
+        When the folder holds no rig's keys, or none of this name has a certificate.
+    """
+    secret = read_secret(folder)
+    person = next((one for one in secret.persons if one.name == name and not one.is_revoked), None)
+    tubes = [file_name(tube) for tube in tubes_of(folder)]
+    if person is not None:
+        make_certificate(folder, name, now, OF_A_PERSON, person.common_name)
+    elif name in tubes or name in SURFACE:
+        make_certificate(folder, name, now, VALID if name in tubes else AT_THE_SURFACE)
+    else:
+        persons = sorted(one.name for one in secret.persons if not one.is_revoked)
+        names = ", ".join((*SURFACE, *tubes, *persons))
+        raise KeyFileError(f"renew: expected one of {names}, got {name!r:.80}")
+    return folder / f"{name}.pem"
 
 
 def rotate_keys(folder: Path, now: datetime.datetime) -> RigSecret:
@@ -167,7 +226,8 @@ def read_secret(folder: Path) -> RigSecret:
     try:
         rows: dict[str, Any] = parse_toml_tables(text)
         generations = tuple(_generation_of(row) for row in rows["generation"])
-        secret = RigSecret(str(rows["rig"]), generations, frozenset(map(int, rows["revoked"])))
+        persons = tuple(map(person_of, rows["person"])) if "person" in rows else FIRST  # of a folder from before them
+        secret = RigSecret(str(rows["rig"]), generations, frozenset(map(int, rows["revoked"])), persons)
     except (KeyError, TypeError, ValueError, AttributeError):
         raise KeyFileError(f"key file {path}: expected what borechain pki wrote, got something else") from None
     if not secret.generations:
@@ -196,7 +256,7 @@ def _write(folder: Path, secret: RigSecret, addresses: Iterable[int]) -> None:
     """Write the secret last: until then the earlier files can be made again."""
     for address in addresses:
         write_private(_file_of(folder, address), pack_ring(secret.ring(address)))
-    write_access(folder, secret.rig, secret.revoked)
+    write_access(folder, secret.rig, admitted_roles(secret.persons), secret.revoked)
     write_private(folder / SECRET_FILE, _pack_secret(secret))
 
 
@@ -207,6 +267,7 @@ def _pack_secret(secret: RigSecret) -> str:
         if g.retires_at is not None:
             lines.append(f"retires_at = {g.retires_at.isoformat()}")
         lines.append(f'secret = "{g.secret.hex()}"')
+    lines += person_lines(secret.persons)
     return "\n".join(lines) + "\n"
 
 

@@ -111,9 +111,10 @@ def drawn_errors(known: KnownSetUp, seed: int) -> dict[str, Any]:
     }
 
 
-def drawn_rigs(known: KnownSetUp, seeds: int, *, stops_anywhere: bool = True) -> list[RigDraw]:
-    """Rigs of the numbers from 1 on, the kinds of holes in turn."""
-    return [RigDraw(known, seed, HOLE_KINDS[seed % len(HOLE_KINDS)], stops_anywhere) for seed in range(1, seeds + 1)]
+def drawn_rigs(known: KnownSetUp, seeds: int, first: int = 1, *, stops_anywhere: bool = True) -> list[RigDraw]:
+    """Rigs of as many numbers from the first on, the kinds of holes in turn."""
+    numbers = range(first, first + seeds)
+    return [RigDraw(known, seed, HOLE_KINDS[seed % len(HOLE_KINDS)], stops_anywhere) for seed in numbers]
 
 
 def play_as(known: KnownSetUp, play_deg: float) -> KnownSetUp:

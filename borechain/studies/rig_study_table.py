@@ -49,6 +49,7 @@ BLUNDERS: Columns = (
     ("causes", "named"),
     ("seen_by", "seen by alone"),
 )
+FIRST: Final = Option("first", 1, 0, 2**31 - 1, help="Number from which the rigs are drawn.")
 RIG_STUDIES: Final = by_name(
     "studies",
     [
@@ -63,6 +64,7 @@ RIG_STUDIES: Final = by_name(
             (
                 Option("seeds", 1000, 2, 100_000),
                 Option("rigs", 40, 2, 10_000, help="Of each row of the second table."),
+                FIRST,
             ),
             counts="rigs",
             full=("--seeds 300 --rigs 20",),
@@ -76,6 +78,7 @@ RIG_STUDIES: Final = by_name(
             (
                 Option("seeds", 200, 1, 10_000),
                 Option("honest", 1000, 1, 100_000, help="Rigs without a blunder."),
+                FIRST,
             ),
             counts="rigs",
             drawn=False,

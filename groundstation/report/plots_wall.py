@@ -18,6 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 
 from groundstation.errors import SurveyError
+from groundstation.report.plane_words import PlaneWords, name_axes
 from groundstation.report.style import (
     GREY,
     INK,
@@ -43,6 +44,7 @@ GREYS, ALARMS = ("#F2F2F2", "#D0D0D0", "#A6A6A6"), ("#E69F00", WRONG)
 SHADES = ("probability", "thickness")
 MOST_CELLS = 240  # along the wall; a cell narrower than that is lost on paper
 LINES = ("-", "--", ":", "-.")
+UPRIGHT = PlaneWords()
 
 
 def joint_name(columns: Columns, found: Joints, joint: int) -> str:
@@ -81,6 +83,7 @@ def wall_figure(
     shown: int = 3,
     allowed: float = 0.05,
     shade: Literal["probability", "thickness"] = "probability",
+    words: PlaneWords = UPRIGHT,
 ) -> Figure:
     """Thickness of the worst joints over depth, all joints as a map, the wall in plan and its worst joint enlarged.
 
@@ -91,6 +94,7 @@ def wall_figure(
     shown : joints whose thickness is drawn, at most 4
     allowed : probability of a joint being too thin, beyond which it is marked
     shade : of the map
+    words : names of the axes
 
     Raises
     ------
@@ -98,7 +102,7 @@ def wall_figure(
         When no joint is known at any depth, or an option has no such value.
     """
     figure = new_figure(8.8, title)
-    _draw(figure, columns, found, required, extra, shown=shown, allowed=allowed, shade=shade)
+    _draw(figure, columns, found, required, extra, shown=shown, allowed=allowed, shade=shade, words=words)
     return tidy_ticks(figure)
 
 
@@ -112,6 +116,7 @@ def _draw(
     shown: int,
     allowed: float,
     shade: str,
+    words: PlaneWords,
 ) -> None:
     """Fill the figure."""
     if shade not in SHADES or not 0.0 < allowed < 0.5 or not 1 <= shown <= len(LINES):
@@ -125,9 +130,13 @@ def _draw(
     bad = np.max(np.where(np.isfinite(found.probability), found.probability, 0.0), axis=1) > allowed
     bad |= np.min(np.where(np.isfinite(found.thickness), found.thickness, np.inf), axis=1) < required
     _thickness(over_depth, columns, found, required, thinness_ranking(found)[:shown], bad)
+    over_depth.set_ylabel(words.depth)
     _map(shades, columns, found, required, allowed, shade)
-    _plan(plan, columns, found, bad)
+    shades.set_ylabel(words.depth)
+    _plan(plan, columns, found, bad, words)
     _zoom(zoom, columns, found, bad, extra)
+    for axes in (plan, zoom):
+        axes.set(xlabel=words.second, ylabel=words.first)
 
 
 def _thickness(
@@ -154,7 +163,7 @@ def _thickness(
                 columns.depths, low, high, color=colour, alpha=0.18, lw=0.0, label=f"its {100.0 * BAND:g} % band"
             )
     axes.axvline(required, color=INK, lw=1.0, ls=(0, (6, 2)), label=f"required, {required:g} m")
-    axes.set(xlabel="Thickness of the joint (m)", ylabel="TVD (m)", title="Worst joints")
+    axes.set(xlabel="Thickness of the joint (m)", title="Worst joints")
     axes.set_ylim(float(columns.depths[-1]), float(columns.depths[0]))
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
 
@@ -203,7 +212,7 @@ def _map(axes: Axes, columns: Columns, found: Joints, required: float, allowed: 
     axes.set_xticks(range(0, count, step), [joint_name(columns, found, k) for k in range(0, count, step)], rotation=90)
     notes = [*(["crossed: missing"] if missing else []), *(["hatched: not surveyed"] if unsurveyed else [])]
     more = ";\n" + "; ".join(notes) if notes else ""
-    axes.set(ylabel="TVD (m)", title=f"All joints (ring: the worst{more})")
+    axes.set(title=f"All joints (ring: the worst{more})")
     bar = axes.figure.colorbar(picture, ax=axes, location="bottom", spacing="uniform", label=label, aspect=30, pad=0.02)
     bar.ax.set_xticks(bounds, [f"{b:.2g}" for b in bounds])
 
@@ -235,10 +244,10 @@ def pooled_cells(values: Array, worst_of: Callable[..., Any]) -> tuple[Array, Ar
 
 def _frame(axes: Axes, title: str) -> None:
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set(xlabel="East (m)", ylabel="North (m)", title=title)
+    axes.set_title(title)
 
 
-def _plan(axes: Axes, columns: Columns, found: Joints, bad: npt.NDArray[np.bool_]) -> None:
+def _plan(axes: Axes, columns: Columns, found: Joints, bad: npt.NDArray[np.bool_], words: PlaneWords) -> None:
     """Whole wall at the depth of the worst joint; what is missing there is a dashed ring at its design."""
     _, depth = worst_joint(found)
     touched = set(found.pairs[bad].ravel().tolist())
@@ -257,7 +266,7 @@ def _plan(axes: Axes, columns: Columns, found: Joints, bad: npt.NDArray[np.bool_
     axes.add_patch(Rectangle(corner, 2.0 * half, 2.0 * half, fc="none", ec=INK, lw=0.8))
     axes.autoscale_view()
     note = " (dashed: missing)" if missing else (" (coloured: a joint not safe)" if touched else "")
-    _frame(axes, f"Plan at {columns.depths[depth]:.1f} m{note}")
+    _frame(axes, f"{words.view} at {columns.depths[depth]:.1f} m{note}")
 
 
 def _window(columns: Columns, found: Joints) -> tuple[Array, float]:
@@ -286,7 +295,7 @@ def _zoom(axes: Axes, columns: Columns, found: Joints, bad: npt.NDArray[np.bool_
     across = np.array([-along[1], along[0]])
     for k in (a, b, *(other for other in range(len(columns.names)) if other not in (a, b))):
         radius = float(columns.radii[k, depth])
-        place = drawn[k] + 0.8 * radius * across
+        place = _label_place(drawn, k, 0.8 * radius * across)
         free = all(np.hypot(*(place - other)) > 0.6 * radius for other in labels)
         if free and np.all(np.abs(drawn[k] - middle) < half - 0.2 * radius):
             labels.append(place)
@@ -310,6 +319,16 @@ def _zoom(axes: Axes, columns: Columns, found: Joints, bad: npt.NDArray[np.bool_
     axes.set_xlim(float(middle[1] - half), float(middle[1] + half), auto=True)
     axes.set_ylim(float(middle[0] - half), float(middle[0] + half), auto=True)
     axes.figure.legend(handles=_legend(colour, extra), loc="outside lower left", ncols=3)
+
+
+def _label_place(drawn: Array, k: int, away: Array) -> Array:
+    """Place of a column's name: ``away`` from its centre, or nearer where that is nearer to another one's."""
+    for share in (1.0, 0.6, 0.35):
+        place = drawn[k] + share * away
+        apart = np.hypot(*(drawn - place).T)
+        if not np.any(np.delete(apart, k) < 1.3 * apart[k]):
+            break
+    return np.asarray(place)
 
 
 def _column(axes: Axes, columns: Columns, k: int, depth: int, known: npt.NDArray[np.bool_]) -> None:
@@ -349,4 +368,5 @@ def draw_wall(wall: Wall, judgement: Judgement) -> Figure:
     joint, _ = worst_joint(judgement.joints)
     title = f"{wall.file.name}: {len(wall.pairs)} joints, {judgement.verdict.value}"
     extra = dict(judgement.extras).get(joint)
-    return wall_figure(wall.built.columns, judgement.joints, wall.file.thickness, extra, title)
+    words = name_axes(wall.built.frame)
+    return wall_figure(wall.built.columns, judgement.joints, wall.file.thickness, extra, title, words=words)

@@ -10,6 +10,7 @@ import numpy as np
 from groundstation.errors import SurveyError
 from groundstation.report.column_report import ColumnRecord, ReportSite, column_report, tolerance_text
 from groundstation.report.document import Document, Origin, ReportSection, report_pdf
+from groundstation.report.plane_words import name_axes
 from groundstation.report.plots_wall import wall_figure
 from groundstation.report.style import svg_of
 from groundstation.survey.wall.column_errors import survey_errors
@@ -57,7 +58,7 @@ def _record(wall: Wall, judgement: Judgement, k: int) -> ColumnRecord:
         told = hole.covs
         covs = position_covariance(survey_errors(survey, plan.tool, wall.file.assumed)) if told is None else told
     covs = covs + plan.head_std**2 * np.diag([1.0, 1.0, 0.0])
-    actions = [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings if name in f.what.split("-")]
+    actions = [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings if f.is_about(name)]
     actions += remedy_lines(wall, judgement, k)
     return ColumnRecord(
         plan.design, state_words(plan, built, k), plan.tool, plan.serial, plan.calibration, plan.head_std, hole.md,
@@ -119,7 +120,8 @@ def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
     joint, _ = worst_joint(judgement.joints)
     title = f"{len(wall.pairs)} joints: {WORDS[judgement.verdict].lower()}"
     extra = dict(judgement.extras).get(joint)
-    picture = wall_figure(wall.built.columns, judgement.joints, file.thickness, extra, title)
+    words = name_axes(wall.built.frame)
+    picture = wall_figure(wall.built.columns, judgement.joints, file.thickness, extra, title, words=words)
     sections = [
         ReportSection("Reasons", [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings] or ["None."]),
         ReportSection("What is to be done", remedy_lines(wall, judgement) or ["Nothing."]),

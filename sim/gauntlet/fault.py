@@ -53,7 +53,7 @@ class Faulty(Protocol):
         """Publish bytes on the key of the depth."""
 
     def order(self, name: str, parameters: dict[str, str]) -> bool:
-        """Have the crew order something; returns whether the ground station obeyed."""
+        """Have the crew order something; returns whether the ground station may have obeyed."""
 
 
 Act = Callable[[Faulty], None]

@@ -15,10 +15,12 @@ from pathlib import Path
 
 from sim.rig.stepper import Acted, Answer, FrameEvent
 from telemetry import keys
+from telemetry.errors import DecodeError
 from telemetry.media.media_table import open_medium
 from telemetry.media.port import STEPPER, Port, PortFrame, TubeEnd
 from telemetry.media.zenoh_bus import Publisher, ZenohBus
 from telemetry.messages import BASE, Side, address_name
+from telemetry.runtime.marked_frames import UNMARKED, MarkedFrames, mark_frame
 from telemetry.runtime.step_stream import StepListener, StepStream
 from telemetry.runtime.stepped import Due, DueEvent, pack_step, unpack_done
 from telemetry.unwritten import Content
@@ -67,7 +69,8 @@ class Seat:
         self.far = FarEnds(rig, address, media)
         self.alive = False
         self.step_number = 0
-        self.tx: tuple[deque[bytes], deque[bytes]] = (deque(), deque())
+        self.tx = (MarkedFrames(), MarkedFrames())
+        self.foreign_there = 0  # frames that the process has dropped
         self.done: deque[bytes] = deque()
         self.stream: StepStream | None = None
         self._key = keys.STEP.format(rig=rig, process=address_name(address))
@@ -90,6 +93,12 @@ class Seat:
         else:
             self._publisher.put(payload)
 
+    def marked(self, event: DueEvent, frame: Content) -> DueEvent:
+        """An event with the mark of its frame, where that goes by the bus."""
+        if event.kind > Side.LOWER or Side(event.kind) in self.far.ports:
+            return event
+        return event._replace(mark=mark_frame(bytes(frame)))
+
     def put(self, side: Side, frame: bytes) -> None:
         """Hand a frame to an end of the process."""
         if side in self.far.ports:
@@ -102,6 +111,11 @@ class Seat:
         self.done.clear()
         for waiting in self.tx:
             waiting.clear()
+
+    @property
+    def foreign(self) -> int:
+        """Frames at either end that no process of the rig sent."""
+        return self.foreign_there + sum(waiting.foreign for waiting in self.tx)
 
 
 class BusStepper:
@@ -134,6 +148,7 @@ class BusStepper:
         self._seats: dict[int, Seat] = {}
         self._events: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
         self._hung: list[int] = []
+        self._junk = 0
         self._cues: dict[str, Acted] = {}  # that the operator has answered
         self._depth = bus.publisher(keys.DEPTH.format(rig=rig))
         self._addresses = {address_name(a): a for a in range(BASE + 1)}
@@ -214,20 +229,31 @@ class BusStepper:
                 seat.put(Side(event.kind), bytes(frame))
             elif event.kind is Due.DEPTH:
                 self._depth.put(event.data)  # for watchers; the ground station has it in its step
-        seat.step(event for event, _ in events)
+        seat.step(seat.marked(event, frame) for event, frame in events)
 
     def _answer(self, seat: Seat) -> Answer | None:
         while seat.done:
-            number, sent, wake_at = unpack_done(seat.done[0])
-            if number != seat.step_number:
+            try:
+                done = unpack_done(seat.done[0])
+            except DecodeError:
+                done = None
+            if done is None or done.number != seat.step_number:
+                self._junk += done is None
                 seat.done.popleft()
                 continue
-            counts = [sum(s.side == side for s in sent) for side in Side]
-            if len(seat.tx[0]) < counts[0] or len(seat.tx[1]) < counts[1]:
+            marks = {side: [s.mark for s in done.sent if s.side == side] for side in Side}
+            if not all(seat.tx[side].has_all(marks[side]) for side in Side):
                 return None
             seat.done.popleft()
-            return Answer([(s, seat.tx[s.side].popleft()) for s in sent], wake_at)
+            seat.foreign_there = done.foreign
+            taken = {side: seat.tx[side].take(is_marked=side not in seat.far.ports) for side in Side}
+            return Answer([(s._replace(mark=UNMARKED), taken[s.side].popleft()) for s in done.sent], done.wake_at)
         return None
+
+    @property
+    def foreign(self) -> int:
+        """Frames, answers and cues that no process of this rig sent; they were dropped."""
+        return self._junk + sum(seat.foreign for seat in self._seats.values())
 
     def _pump(self, timeout: float) -> bool:
         """Take what came from the bus's threads or on a stream; False when nothing did in time."""
@@ -259,9 +285,15 @@ class BusStepper:
             self._settle(address)
         elif what == "cue":
             acted, _, name = payload.decode(errors="replace").partition(" ")
-            self._cues[name] = Acted(acted)
+            if acted in set(Acted):
+                self._cues[name] = Acted(acted)
+            else:
+                self._junk += 1
         elif seat is not None and seat.alive:
-            (seat.done if what == "done" else seat.tx[side]).append(payload)
+            if what == "done":
+                seat.done.append(payload)
+            else:
+                seat.tx[side].add(payload)
 
     def _seat_of(self, address: int) -> Seat:
         seat = self._seats.get(address)

@@ -12,57 +12,75 @@ import asyncio
 import queue
 import threading
 import time
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 
 from telemetry import keys
+from telemetry.errors import DecodeError
 from telemetry.media.port import Port, PortFrame
 from telemetry.media.zenoh_bus import ZenohBus
+from telemetry.media.zenoh_port import ZenohPort
 from telemetry.messages import Side, address_name
 from telemetry.runtime.inbox import Inbox
+from telemetry.runtime.marked_frames import MarkedFrames, mark_frame
 from telemetry.runtime.process_interface import Process
 from telemetry.runtime.step_stream import StepStream
-from telemetry.runtime.stepped import Due, DueEvent, Sent, pack_done, run_step, unpack_step
+from telemetry.runtime.stepped import Done, Due, DueEvent, Sent, pack_done, run_step, unpack_step
 from telemetry.unwritten import Content
 
 ABSENT_LIMIT = 60.0  # wall s without a first step until that is reported
 UP_LIMIT, UP_TICK = 5.0, 0.001  # wall s that the other end of a port may take to be there, and between two looks
 STEP, STOP = -1, -2  # channels beside those of the frames
-CHANNELS = (STEP, Due.UPPER_FRAME, Due.LOWER_FRAME)
+CHANNELS = (Due.UPPER_FRAME, Due.LOWER_FRAME)
 Arrival = tuple[int, bytes]  # channel, payload
 Step = tuple[int, list[tuple[DueEvent, bytes]]]  # number, events and the bytes of each
 Report = Callable[[str], None]
 
 
 class StepAssembler:
-    """Puts steps together with the frames they name, in whatever order these arrive."""
+    """Puts steps together with the frames they name, in whatever order these arrive; what is foreign is dropped."""
 
     def __init__(self) -> None:
-        self._waiting: dict[int, deque[bytes]] = {channel: deque() for channel in CHANNELS}
+        self._steps: deque[bytes] = deque()
+        self._junk = 0
+        self._frames: dict[int, MarkedFrames] = {channel: MarkedFrames() for channel in CHANNELS}
         self._step: tuple[int, list[DueEvent]] | None = None
 
     @property
     def has_step(self) -> bool:
         """Whether a step is here, with or without its frames."""
-        return self._step is not None or bool(self._waiting[STEP])
+        return self._step is not None or bool(self._steps)
+
+    @property
+    def foreign(self) -> int:
+        """Steps that are none, and frames that were dropped because no step named them."""
+        return self._junk + sum(frames.foreign for frames in self._frames.values())
 
     def add(self, channel: int, payload: bytes) -> None:
         """Add what arrived on a channel."""
-        self._waiting[channel].append(payload)
+        if channel == STEP:
+            self._steps.append(payload)
+        else:
+            self._frames[channel].add(payload)
 
     def take_step(self) -> Step | None:
         """The next step once all its frames are here."""
         if self._step is None:
-            if not self._waiting[STEP]:
+            if not self._steps:
                 return None
-            self._step = unpack_step(self._waiting[STEP].popleft())
+            try:
+                self._step = unpack_step(self._steps.popleft())
+            except DecodeError:
+                self._junk += 1
+                return self.take_step()
         number, events = self._step
-        needed = Counter(event.kind for event in events if event.kind in CHANNELS)
-        if any(len(self._waiting[channel]) < count for channel, count in needed.items()):
+        marks = {channel: [event.mark for event in events if event.kind == channel] for channel in CHANNELS}
+        if not all(self._frames[channel].has_all(wanted) for channel, wanted in marks.items()):
             return None
         self._step = None
-        return number, [(e, self._waiting[e.kind].popleft() if e.kind in CHANNELS else b"") for e in events]
+        taken = {channel: self._frames[channel].take(is_marked=any(wanted)) for channel, wanted in marks.items()}
+        return number, [(e, taken[e.kind].popleft() if e.kind in CHANNELS else b"") for e in events]
 
 
 class StepEnd:
@@ -109,12 +127,14 @@ class StepEnd:
             if what.side in self._unheard:
                 self._unheard.discard(what.side)
                 wait_until_up(self._ports[what.side])
+            port = self._ports[what.side]
             # the stepper waits for every frame and in this order, so none may replace or overtake another
-            if self._ports[what.side].send(PortFrame(frame.payload)):
-                sent.append(what)
+            if port.send(PortFrame(frame.payload)):
+                is_compared = isinstance(port, ZenohPort)
+                sent.append(what._replace(mark=mark_frame(bytes(frame.payload))) if is_compared else what)
 
         wake_at = run_step(process, events, send)
-        self._answer(pack_done(number, sent, wake_at))
+        self._answer(pack_done(Done(number, sent, wake_at, self.assembler.foreign)))
 
 
 class StepClient(StepEnd):

@@ -14,9 +14,10 @@ from typing import Any, Final, NamedTuple
 
 import msgpack
 
-from telemetry.errors import MediumError
+from telemetry.errors import DecodeError, MediumError
 from telemetry.media.port import PortFrame
 from telemetry.messages import Side
+from telemetry.runtime.marked_frames import UNMARKED
 from telemetry.runtime.process_interface import Process
 from telemetry.unwritten import Content
 
@@ -37,6 +38,7 @@ class DueEvent(NamedTuple):
     kind: Due
     at: float
     data: Any = None  # CYCLE: [start, *sample]; DEPTH: the reading's payload; of a frame by radio its margin, dB
+    mark: bytes = UNMARKED  # of a frame that comes by the bus, see ``marked_frames``
 
 
 class Sent(NamedTuple):
@@ -44,6 +46,7 @@ class Sent(NamedTuple):
 
     side: Side
     at: float
+    mark: bytes = UNMARKED  # of a frame that goes by the bus, see ``marked_frames``
 
 
 CYCLE, DEPTH = Due.CYCLE, Due.DEPTH
@@ -52,7 +55,7 @@ SIDE_OF: Final = {Due.UPPER_FRAME: Side.UPPER, Due.LOWER_FRAME: Side.LOWER}  # t
 
 def pack_step(number: int, events: Iterable[DueEvent]) -> bytes:
     """Step on the wire."""
-    return bytes(msgpack.packb([number, [[int(e.kind), e.at, e.data] for e in events]]))
+    return bytes(msgpack.packb([number, [[int(e.kind), e.at, e.data, e.mark] for e in events]]))
 
 
 def unpack_step(payload: bytes) -> tuple[int, list[DueEvent]]:
@@ -62,23 +65,52 @@ def unpack_step(payload: bytes) -> tuple[int, list[DueEvent]]:
     ------
     MediumError
         When the stepper is of another version.
+    DecodeError
+        When the bytes are no step.
     """
-    number, rows = msgpack.unpackb(payload)
     try:
-        return number, [DueEvent(Due(kind), at, data) for kind, at, data in rows]
+        number, rows = msgpack.unpackb(payload)
+        is_step = isinstance(number, int) and all(len(row) == 4 and isinstance(row[1], float) for row in rows)
+    except (ValueError, TypeError, msgpack.UnpackException):
+        is_step = False
+    if not is_step:
+        raise DecodeError("step: expected its number and events, got something else")
+    try:
+        return number, [DueEvent(Due(kind), at, data, mark) for kind, at, data, mark in rows]
     except ValueError as error:
         raise MediumError(f"stepper: step {number}: {error}; is it of another version?") from error
 
 
-def pack_done(number: int, sent: Iterable[Sent], wake_at: float) -> bytes:
+class Done(NamedTuple):
+    """Answer to a step: its number, frames sent in order, next timer (local time, s), foreign frames so far."""
+
+    number: int
+    sent: list[Sent]
+    wake_at: float
+    foreign: int = 0
+
+
+def pack_done(done: Done) -> bytes:
     """Answer to a step on the wire."""
-    return bytes(msgpack.packb([number, [[int(s.side), s.at] for s in sent], wake_at]))
+    return bytes(msgpack.packb([done.number, [list(s) for s in done.sent], done.wake_at, done.foreign]))
 
 
-def unpack_done(payload: bytes) -> tuple[int, list[Sent], float]:
-    """Number of the step, frames sent in order and next timer (local time, s)."""
-    number, sent, wake_at = msgpack.unpackb(payload)
-    return number, [Sent(Side(side), at) for side, at in sent], wake_at
+def unpack_done(payload: bytes) -> Done:
+    """Answer to a step.
+
+    Raises
+    ------
+    DecodeError
+        When the bytes are none.
+    """
+    try:
+        number, sent, wake_at, foreign = msgpack.unpackb(payload)
+        done = Done(number, [Sent(Side(side), at, mark) for side, at, mark in sent], wake_at, foreign)
+    except (ValueError, TypeError, msgpack.UnpackException) as error:
+        raise DecodeError(f"answer to a step: expected what a process of the rig sends, got {error}") from error
+    if not isinstance(number, int) or not isinstance(foreign, int) or not isinstance(wake_at, float):
+        raise DecodeError("answer to a step: expected its number, frames, timer and count")
+    return done
 
 
 def run_step(
@@ -96,7 +128,7 @@ def run_step(
 
 def dispatch_event(process: Process, event: DueEvent, frame: Content) -> None:
     """Hand one event to the process; the data of a frame that came by radio are its margin (dB)."""
-    kind, at, data = event
+    kind, at, data, _ = event
     side = SIDE_OF.get(kind)
     if side is not None and data is None:
         process.on_frame(side, frame, at)

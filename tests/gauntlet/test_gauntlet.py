@@ -96,6 +96,7 @@ def test_combined_seeds_hold(world: int, part: int) -> None:
         (51416, ("cut-again-and-again", "node-memory-lost", "splice")),  # a recorded state of an epoch before the last
         (104026, ("cut-while-saving", "not-finite", "encoder-slips")),  # one rested, the other was blind
         (102831, ("database-deleted", "gyro-saturated", "encoder-slips")),  # it was forgotten that one was blind
+        (700999, ("cut-while-saving", "database-old", "length-wrong")),  # while an order of the crew was written down
         (107936, ("cut-while-saving", "frozen")),  # the power went while it saved what it had missed
         (206677, ("gyro-saturated", "encoder-slips")),  # the one that saw it had just started, the other was blind
         (206003, ("clock-jumps", "joint-severed")),  # an aiding of before a turning came to a clock that was ahead

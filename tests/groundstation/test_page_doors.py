@@ -1,8 +1,13 @@
 """Who comes in at the page: passwords and sessions, ports and addresses, and what a network asks of them."""
 
+import contextlib
+import datetime
 import re
 import socket
 import ssl
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,8 +18,10 @@ from hypothesis import strategies as st
 from page_client import PASSWORD, PageClient, free_port
 from sealed_string import make_folder
 from served import serving
+from starlette.datastructures import Address
 
 from groundstation.errors import ConfigurationError, PageError
+from groundstation.gateway.page.connections import CONNECTIONS, OF_ONE_ADDRESS, SignedPeers, those_to_end
 from groundstation.gateway.page.page_settings import PageSettings, check_certificate, open_page_socket, parse_address
 from groundstation.gateway.page.passwords import drawn_password, hash_of, is_right, read_passwords, text_of
 from groundstation.gateway.page.sessions import LONGEST_HOLD_S, SESSIONS, VALID_S, Sessions, WrongPasswords, is_from
@@ -115,7 +122,7 @@ def test_over_a_network_reading_needs_a_session_too(tmp_path: Path, passwords: d
 
 
 def test_over_https_the_cookie_goes_nowhere_else(tmp_path: Path, passwords: dict[str, str]) -> None:
-    stick, port = make_folder(tmp_path / "stick"), free_port()
+    stick, port = make_folder(tmp_path / "stick", now=datetime.datetime.now(datetime.UTC)), free_port()
     certificate, key = stick / "router.pem", stick / "router.key"
     check_certificate(certificate, key)
     with pytest.raises(ConfigurationError, match="page-tls: expected a certificate and its key"):
@@ -130,3 +137,98 @@ def test_over_https_the_cookie_goes_nowhere_else(tmp_path: Path, passwords: dict
         assert "; Secure" in answer.headers["set-cookie"]
         assert answer.headers["strict-transport-security"].startswith("max-age=")
         assert client.get("/api/session").content["orders"]
+
+
+def test_a_person_signs_in_with_a_password_of_its_own_and_is_out_when_it_is_taken_away(tmp_path: Path) -> None:
+    hers, shared = "the word of anna", OPERATOR_PASSWORD
+    book = {"driller/anna": hash_of(hers), "driller": hash_of(PASSWORD), "operator": hash_of(shared)}
+    file, port = tmp_path / "passwords", free_port()
+    file.touch(0o600)
+    file.write_text(text_of(book))
+    page = PageSettings("127.0.0.1", port, passwords=read_passwords(file), password_file=file)
+    with serving(Rig(tmp_path, target=20.0), page):
+        anna, ben = PageClient(port), PageClient(port)
+        assert anna.sign_in("driller", hers, "anna").status == 200
+        assert ben.sign_in("driller", PASSWORD, "ben").status == 200
+        assert anna.get("/api/session").content["roles"] == ["driller", "operator"]
+        for role, word in (("driller", PASSWORD), ("operator", shared)):  # another's word under her name
+            imposter = PageClient(port)
+            deadline = time.monotonic() + 60.0
+            while (refused := imposter.sign_in(role, word, "anna").status) == 429:
+                assert time.monotonic() < deadline
+            assert refused == 401
+        with following(port, anna) as stream:
+            del book["driller/anna"]
+            file.write_text(text_of(book))
+            assert anna.get("/api/session").content["role"] is None
+            assert anna.post("/api/cmd/take_survey", {"tube": 1}).status == 401
+            while stream.recv(65_536):  # it ends
+                pass
+        assert ben.get("/api/session").content["name"] == "ben"
+        file.write_text("driller plain\n")
+        assert ben.get("/api/session").content["role"] is None
+        told = ben.post("/api/session", {"role": "driller", "name": "ben", "password": PASSWORD})
+        assert (told.status, "line 1: expected what borechain pki password wrote" in told.content["error"]) == (
+            403,
+            True,
+        )
+
+
+@contextlib.contextmanager
+def following(port: int, client: PageClient) -> Iterator[socket.socket]:
+    """A stream with a client's session."""
+    with socket.create_connection(("127.0.0.1", port), 60.0) as connection:
+        lines = f"GET /api/stream HTTP/1.1\r\nHost: 127.0.0.1\r\nCookie: {client.headers['cookie']}\r\n\r\n"
+        connection.sendall(lines.encode())
+        assert connection.recv(65_536)
+        yield connection
+
+
+@pytest.mark.parametrize("names", [["a"] * 20, ["a", "b"] * 10])
+def test_a_name_is_held_from_every_address_but_where_it_has_signed_in(names: list[str]) -> None:
+    wrong, now = WrongPasswords(), 1000.0
+    wrong.forgive("crew", "a")
+    for number, name in enumerate(names):
+        wrong.add(f"stranger {number}", now, name)
+    assert wrong.hold_of("another", now, "a") > 10.0
+    assert wrong.hold_of("crew", now, "a") == 0.0
+    assert wrong.hold_of("another", now, "c") == 0.0
+    assert wrong.hold_of("stranger 3", now, "c") == 1.0
+
+
+@dataclass
+class Connected:
+    """What a protocol is to those who make room."""
+
+    client: tuple[str, int]
+    opened: int
+    is_busy: bool = False
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from("abcdef"), st.booleans(), st.booleans()), max_size=400),
+)
+def test_one_more_connection_finds_a_place_and_nobody_who_is_signed_in_gives_way(
+    rows: list[tuple[str, bool, bool]],
+) -> None:
+    signed, there = SignedPeers(), []
+    for number, (of, is_busy, has_session) in enumerate(rows):
+        fresh = Connected((of, number), number, is_busy)
+        if has_session and len(signed) < 100:
+            signed.add(Address(of, number))
+        there.append(fresh)
+        gone = those_to_end(there, fresh, signed)  # type: ignore[arg-type, type-var]
+        assert fresh not in gone
+        assert not any(one.client in signed for one in gone)
+        for one in gone:  # one that stays at its address has a request, or came later
+            assert all(
+                (one.is_busy, one.opened) < (other.is_busy, other.opened)
+                for other in there
+                if other not in gone
+                and other is not fresh
+                and other.client not in signed
+                and other.client[0] == one.client[0]
+            )
+        there = [one for one in there if one not in gone]
+        assert len(there) <= CONNECTIONS
+        assert sum(one.client[0] == of and one.client not in signed for one in there) <= OF_ONE_ADDRESS

@@ -12,6 +12,7 @@ from groundstation.errors import SurveyError
 from groundstation.service.answers.wall_views import survey_of
 from groundstation.service.hole.live_wall import LiveWall
 from groundstation.survey.wall.column_plans import ColumnSurvey
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.judged_wall import judge_wall
 from groundstation.survey.wall.wall_file import Wall, read_wall
 from groundstation.survey.wall.wall_verdict import Judgement
@@ -145,6 +146,28 @@ def test_a_void_beside_the_hole_is_seen_live(tmp_path: Path) -> None:
     _, by_file, _, live = both_doors(tmp_path, CASES["grid"], 6.0, with_covs=True)
     assert by_file.voids
     assert [(v.depth, v.void.area) for v in live.voids] == [(v.depth, v.void.area) for v in by_file.voids]
+
+
+@pytest.mark.parametrize("toe_m", [8.0, 8.2, 8.49])
+def test_a_hole_comes_to_its_toe_wherever_that_lies_between_two_planes(tmp_path: Path, toe_m: float) -> None:
+    """The bit goes on from the last station, and nothing else changes: all of the column is drilled then."""
+    case = CASES["raked"]
+    holes = {name: surveyed(case, name, 0.0) for name in case.heads}
+    own = holes.pop(case.own)
+    file = written(tmp_path, case, holes, with_covs=True)
+    file.write_text(file.read_text().replace(f"length_m = {LENGTH}", f"length_m = {toe_m}"))
+    live, fresh = LiveWall(file, case.own), LiveWall(file, case.own)
+    planes, gone = [], 0
+    for bit in (LENGTH - 0.07, LENGTH, toe_m):
+        found = live.judged(own, bit)
+        planes.append(live.plane_of(bit))
+        assert found.judgement is not None
+        gone = int(np.sum(found.wall.columns.states[found.own] == ColumnState.MISSING))
+    anew = fresh.judged(own, toe_m)
+    assert gone == 0
+    assert anew.judgement is not None
+    assert [f.text for f in found.judgement.findings] == [f.text for f in anew.judgement.findings]
+    assert planes[0] < planes[-1]  # what shows the wall asks for it anew then
 
 
 def test_own_covariances_are_used(tmp_path: Path) -> None:

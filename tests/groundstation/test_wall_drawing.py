@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -10,9 +11,19 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from groundstation.report.plots_wall import wall_figure
-from groundstation.survey.wall.as_built import Columns
-from groundstation.survey.wall.wall_joints import Joints, judge_joints, neighbours_in_line, worst_joint
+from groundstation.report.plane_words import name_axes
+from groundstation.report.plots_wall import draw_wall, wall_figure
+from groundstation.survey.wall.as_built import Columns, plane_frame
+from groundstation.survey.wall.column_deviation import ColumnDesign
+from groundstation.survey.wall.judged_wall import judge_wall
+from groundstation.survey.wall.wall_file import read_wall
+from groundstation.survey.wall.wall_joints import (
+    Joints,
+    judge_joints,
+    neighbours_in_grid,
+    neighbours_in_line,
+    worst_joint,
+)
 
 RADIUS, REQUIRED, COUNT = 0.6, 0.8, 5
 DEPTHS = np.arange(0.0, 20.1, 1.0)
@@ -119,3 +130,68 @@ def test_thickness_is_drawn_over_depth_downwards_the_worst_joint_first() -> None
     assert (ring.get_xdata()[0], ring.get_ydata()[0]) == (joint, columns.depths[depth])
     cells = np.asarray(shades.collections[0].get_array()).reshape(len(DEPTHS), COUNT - 1)
     np.testing.assert_allclose(cells, found.probability.T)
+
+
+AXES = {"North": (1, 0, 0), "South": (-1, 0, 0), "East": (0, 1, 0), "West": (0, -1, 0), "Down": (0, 0, 1)} | {
+    "Up": (0, 0, -1)
+}
+
+
+@pytest.mark.parametrize(
+    ("inclination_deg", "azimuth_deg", "first", "second", "depth"),
+    [
+        (0.0, 0.0, "North", "East", "TVD"),
+        (90.0, 0.0, "Up", "East", "Along the columns"),
+        (90.0, 90.0, "North", "Up", "Along the columns"),
+        (90.0, 180.0, "Down", "East", "Along the columns"),
+        (15.0, 0.0, "Mostly north", "East", "Along the columns"),
+        (15.0, 90.0, "North", "Mostly east", "Along the columns"),
+    ],
+)
+def test_axes_of_planes_are_named_by_where_they_point(
+    inclination_deg: float, azimuth_deg: float, first: str, second: str, depth: str
+) -> None:
+    i, a = math.radians(inclination_deg), math.radians(azimuth_deg)
+    axis = np.array([math.sin(i) * math.cos(a), math.sin(i) * math.sin(a), math.cos(i)])
+    frame = plane_frame([ColumnDesign(inclination=i, azimuth=a)])
+    np.testing.assert_allclose(frame[2], axis, atol=1e-12)
+    words = name_axes(frame)
+    assert words.depth == f"{depth} (m)"
+    for row, word in zip(frame, (first, second), strict=False):
+        assert row @ AXES[word.split()[-1].capitalize()] > (0.95 if "ostly" in word else 0.999)
+    assert words[:2] == (f"{first} (m)", f"{second} (m)")
+
+
+def test_a_level_wall_says_up_and_along(tmp_path: Path) -> None:
+    """Three columns to the north, the middle one of which rises: it lies higher in the picture, whose axis says up."""
+    (tmp_path / "heads.csv").write_text("column,north_m,east_m\nA,0,0\nB,0,0.75\nC,0,1.5\n")
+    rows = [f"{name},{md},{90 + (name == 'B')},0" for name in "ABC" for md in (0, 5, 10)]
+    (tmp_path / "stations.csv").write_text("column,md_m,inclination_deg,azimuth_deg\n" + "\n".join(rows) + "\n")
+    (tmp_path / "wall.toml").write_text(
+        'radius_m = 0.6\nthickness_m = 0.8\nlength_m = 10\ninclination_deg = 90\nheads = "heads.csv"\n'
+        'stations = "stations.csv"\n'
+    )
+    found = read_wall(tmp_path / "wall.toml")
+    figure = draw_wall(found, judge_wall(found))
+    plt.close(figure)
+    thick, shades, plan, zoom = figure.axes[:4]
+    assert {axes.get_ylabel() for axes in (thick, shades)} == {"Along the columns (m)"}
+    assert {(axes.get_xlabel(), axes.get_ylabel()) for axes in (plan, zoom)} == {("East (m)", "Up (m)")}
+    centres = np.array([one.get_center() for one in of(plan, "column")])
+    rise = 10.0 * math.tan(math.radians(1.0))
+    np.testing.assert_allclose(centres, [[0.0, 0.0], [0.75, rise], [1.5, 0.0]], atol=1e-9)
+
+
+def test_a_column_of_a_grid_is_nearer_to_its_name_than_any_other() -> None:
+    heads = 0.75 * np.array([[r, c] for r in range(3) for c in range(3)], float)
+    centres = np.repeat(heads[:, None], len(DEPTHS), axis=1)
+    centres[4] += 0.004 * DEPTHS[:, None]
+    covs = np.broadcast_to(1e-6 * np.eye(2), (9, len(DEPTHS), 2, 2))
+    columns = Columns.surveyed([f"G{k}" for k in range(9)], DEPTHS, centres, covs, heads, RADIUS)
+    figure = wall_figure(columns, judge_joints(columns, neighbours_in_grid(heads, 0.75), REQUIRED), REQUIRED, None, "g")
+    plt.close(figure)
+    names = [text for text in figure.axes[3].texts if text.get_text().startswith("G")]
+    assert len(names) >= 6
+    for text in names:
+        away = np.hypot(*(centres[:, -1, ::-1] - text.get_position()).T)
+        assert f"G{int(np.argmin(away))}" == text.get_text()

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import RING, default_config
 from node.kernels.record.node_record import new_node
-from node.kernels.turns.swings import follow_swing, swing_var
+from node.kernels.turns.swings import explains_jump, follow_inside, follow_swing, is_beat, swing_var
 
 Array = npt.NDArray[np.float64]
 SPEED = math.radians(71.0)
@@ -66,3 +66,49 @@ def test_a_drive_that_has_stopped_swings_no_more() -> None:
     variances = swung(np.concatenate([mean_rates(turned), np.zeros(20)]))
     assert variances[58] > 0.0
     assert not any(variances[-8:])
+
+
+class Beating:
+    """A node under a head that swings inside its cycles: it sees their means, and the encoder's rate at an aiding."""
+
+    def __init__(self) -> None:
+        self.nodes = new_node(default_config())
+        self.node = self.nodes[0]
+        self.cycles = 0
+
+    def aid(self, mean: float, told: float, innovation: float = 0.0) -> None:
+        state = self.node["filter"]
+        state["ring_rate"][self.cycles % RING, 2] = mean
+        self.cycles += 1
+        state["cycles"], state["innovation"] = self.cycles, innovation
+        self.node["guard"]["rate"] = told
+        follow_inside(self.node)
+
+
+@pytest.mark.parametrize("swing_s", [0.46, 0.5, 0.55, 0.6])
+def test_a_beat_is_no_step_of_the_gyroscope(swing_s: float) -> None:
+    """Of w (1 + r cos x), x = 2 pi t / T, the angle is off by r w T sin x / (2 pi), taken once a cycle."""
+    beating, ripple = Beating(), 0.3
+    phase = math.tau * PERIOD / swing_s * np.arange(60)
+    off = ripple * SPEED * swing_s / math.tau * np.sin(phase)
+    for k in range(60):
+        beating.aid(SPEED, SPEED * (1.0 + ripple * math.cos(phase[k])), float(off[k]))
+    grown = np.diff(off) / PERIOD
+    assert is_beat(beating.node, float(np.max(np.abs(grown)) / math.sqrt(2.0)))
+    assert explains_jump(beating.node)
+
+
+@pytest.mark.parametrize("step_dps", [0.2, 1.0, 3.0, 8.0])
+def test_a_step_of_the_gyroscope_is_no_beat(step_dps: float) -> None:
+    stepped = Beating()
+    for k in range(30):
+        stepped.aid(SPEED + math.radians(step_dps) * (k > 10), SPEED, math.radians(1.0))
+    assert not is_beat(stepped.node, math.radians(step_dps))
+
+
+def test_an_even_drive_explains_no_jump() -> None:
+    even, random = Beating(), np.random.default_rng(3)
+    for _ in range(40):
+        even.aid(SPEED, SPEED + math.radians(0.3) * float(random.standard_normal()), math.radians(1.0))
+    assert not explains_jump(even.node)
+    assert not is_beat(even.node, math.radians(0.2))

@@ -139,3 +139,15 @@ def test_a_line_that_is_pulled_out_is_told_once_and_comes_back(line: Line, tmp_p
     assert said == [(Severity.ERROR, "sensor_failed"), (Severity.WARNING, "sensor_back")]
     source.close()
     again.cut()
+
+
+@pytest.mark.parametrize(
+    ("rate", "force", "bits"),
+    [(34.8, 156.9, 0), (34.9, 0.0, 1), (-34.9, 0.0, 1), (0.0, 157.0, 2), (0.0, -157.0, 2), (35.0, 158.0, 3)],
+)
+def test_each_sensor_at_its_range_has_a_bit_of_its_own(line: Line, rate: float, force: float, bits: int) -> None:
+    source = started(line)
+    for axis in range(3):
+        at_range = np.eye(3)[axis]
+        line.send(line_of(rate * at_range, force * at_range) + line_of(np.zeros(3), np.zeros(3)))
+        assert source.read(0.02 * axis, 0.02 * axis + 0.02).saturated == bits

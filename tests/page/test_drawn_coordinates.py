@@ -425,13 +425,37 @@ def test_the_newest_orders_stand_there_the_newest_first(page: Page) -> None:
 
 def test_the_joint_that_most_likely_leaks_stands_first(page: Page) -> None:
     joints = [
-        {"joint": f"J{k}", "thickness_m": 1.0, "thinnest_at_m": 1.0, "probability_where_surveyed": p}
+        {
+            "joint": f"J{k}",
+            "thickness_m": 1.0,
+            "thinnest_at_m": 1.0,
+            "probability_where_surveyed": p,
+            "surveyed_percent": 100,
+        }
         for k, p in enumerate((0.02, 0.3, None, 0.1))
     ]
     wall = {"name": "w", "hole": "H", "problem": None, "required_thickness_m": 0.8, "allowed_probability": 0.05}
+    wall |= {"verdict": "not_tight", "findings": [f"void {k}" for k in range(9)]}
     tell(page, "wall", {"wall": wall | {"joints": joints}})
     expect(page.locator("#joints tr")).to_have_count(4)
     assert [text.split()[0] for text in page.locator("#joints tr").all_inner_texts()] == ["J1", "J3", "J0", "J2"]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "word"),
+    [("tight", "tight; "), ("not_proven", "NOT PROVEN to be tight; "), ("not_tight", "NOT TIGHT so far; ")],
+)
+def test_what_speaks_against_a_wall_stands_beside_its_joints(page: Page, verdict: str, word: str) -> None:
+    """A void is in no joint: of nine reasons six are told, with how many more there are."""
+    joint = {"joint": "A-B", "thickness_m": 1.0, "thinnest_at_m": 1.0, "probability_where_surveyed": 1e-9}
+    wall = {"name": "w", "hole": "H", "problem": None, "required_thickness_m": 0.8, "allowed_probability": 0.05}
+    wall |= {"joints": [joint | {"surveyed_percent": 75}], "verdict": verdict}
+    counts = ((9, [*(f"void {k}" for k in range(6)), "and 3 more"]), (1, ["void 0"]), (0, []))
+    for revision, (count, told) in enumerate(counts, 1):
+        tell(page, "wall", {"wall": wall | {"findings": [f"void {k}" for k in range(count)]}}, revision)
+        expect(page.locator("#wall-findings li")).to_have_text(told)
+    expect(page.locator("#wall-problem")).to_have_text(f"{word}required 80 cm")
+    expect(page.locator("#joints tr td").last).to_have_text("1e-9, 75 % surveyed")
 
 
 def test_the_end_is_shared_between_ground_and_survey_by_variance(page: Page) -> None:

@@ -102,6 +102,8 @@ def test_the_joints_with_the_neighbours_stand_there_the_worst_first(tmp_path: Pa
         expect(page.locator("#joints tr")).to_have_count(2)
         expect(page.locator("#joints tr").first).to_have_class("grave")
         expect(page.locator("#joints tr").first).to_contain_text("too thin")
+        expect(page.locator("#wall-problem")).to_have_text("NOT TIGHT so far; required 80 cm")
+        expect(page.locator("#wall-findings")).to_contain_text("column H2 is missing from ")
         page.evaluate(AXE)
         assert page.evaluate(FINDINGS) == []
 

@@ -49,11 +49,11 @@ COV = ((1e-6, 0.0, 0.0), (0.0, 1e-6, 0.0), (0.0, 0.0, 1e-6))
 End = tuple[int, Side]
 
 
-def make_folder(folder: Path, tubes: int = 2) -> Path:
-    """Keys of a rig."""
-    init_rig(folder, "rig-1", NOW, random.Random(1).randbytes)
+def make_folder(folder: Path, tubes: int = 2, now: datetime.datetime = NOW) -> Path:
+    """Keys of a rig; whose certificates are shown to a real router, is made ``now``."""
+    init_rig(folder, "rig-1", now, random.Random(1).randbytes)
     for tube in range(1, tubes + 1):
-        add_tube(folder, tube, NOW)
+        add_tube(folder, tube, now)
     return folder
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import datetime
 import queue
 import textwrap
 from collections.abc import Iterator
@@ -28,12 +29,13 @@ RIG = "rig-1"
 WAIT = 20.0  # s; nothing that is to come takes as long
 BRIEFLY = 2.0  # s that a session tries to connect
 STATUS, ORDER = f"borechain/{RIG}/ground/status", f"borechain/{RIG}/cmd/take_survey"
+TODAY = datetime.datetime.now(datetime.UTC)
 LAST = "last"  # follows what must not arrive: a session keeps the order of what it sends
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return make_folder(tmp_path_factory.mktemp("pki") / "stick")
+    return make_folder(tmp_path_factory.mktemp("pki") / "stick", now=TODAY)
 
 
 @pytest.fixture(scope="module")
@@ -166,7 +168,7 @@ def test_a_source_of_the_depth_as_the_page_writes_it_is_believed(
 
 
 def test_a_client_without_a_certificate_of_the_rig_gets_nowhere(endpoint: str, folder: Path, tmp_path: Path) -> None:
-    foreign = credentials_of(make_folder(tmp_path / "foreign", 1), "tube-1")
+    foreign = credentials_of(make_folder(tmp_path / "foreign", 1, TODAY), "tube-1")
     ours = credentials_of(folder, "tube-1")
     mixed = Credentials(
         ours.authority, foreign.certificate, foreign.key

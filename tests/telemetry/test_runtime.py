@@ -18,6 +18,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sim.rig.bus_stepper import BusStepper
 from sim.rig.stepper import Answer, FrameEvent
@@ -33,6 +35,7 @@ from telemetry.presentation.msgpack_codec import decode_message, encode_message
 from telemetry.runtime import step_client
 from telemetry.runtime.hosting import Place
 from telemetry.runtime.inbox import INBOX_LIMIT, Inbox
+from telemetry.runtime.marked_frames import mark_frame
 from telemetry.runtime.own_clock import ABSENT_LIMIT, AbsenceWatch, OwnClock, OwnClockLoop
 from telemetry.runtime.process_interface import Process
 from telemetry.runtime.step_client import STEP, AsyncStepClient, StepAssembler, StepClient, serve_stepped, serve_steps
@@ -250,6 +253,33 @@ class TestSteps:
         assembler.add(Due.UPPER_FRAME, b"late")
         assert assembler.take_step() == (7, list(zip(events, [b"early", b"late", b""], strict=True)))
         assert assembler.take_step() is None
+
+    @given(st.lists(st.binary(max_size=3), max_size=6), st.data())
+    def test_a_step_takes_its_own_frames_out_of_any_number_of_foreign_ones(
+        self, frames: list[bytes], data: st.DataObject
+    ) -> None:
+        """Foreign frames are put between, before and behind; one that has the bytes of the next is that one."""
+        assembler = StepAssembler()
+        for number in (1, 2):
+            events = [DueEvent(Due.UPPER_FRAME, 1.0, None, mark_frame(frame)) for frame in frames]
+            assembler.add(STEP, pack_step(number, events))
+            for frame in frames:
+                for foreign in data.draw(st.lists(st.binary(min_size=4, max_size=6), max_size=3)):
+                    assembler.add(Due.UPPER_FRAME, foreign)
+                    assembler.add(STEP, foreign)
+                assembler.add(Due.UPPER_FRAME, frame)
+            step = assembler.take_step()
+            assert step is not None
+            assert (step[0], [frame for _, frame in step[1]]) == (number, frames)
+
+    def test_what_waits_for_no_step_is_bounded(self) -> None:
+        assembler = StepAssembler()
+        for number in range(10_000):
+            assembler.add(Due.UPPER_FRAME, b"foreign %d" % number)
+        assembler.add(Due.UPPER_FRAME, b"own")
+        assembler.add(STEP, pack_step(1, [DueEvent(Due.UPPER_FRAME, 1.0, None, mark_frame(b"own"))]))
+        assert assembler.take_step() is not None
+        assert assembler.foreign == 10_000
 
     def test_a_step_of_another_version_is_one_line(self) -> None:
         with pytest.raises(MediumError, match="step 3: 99 is not a valid Due; is it of another version"):

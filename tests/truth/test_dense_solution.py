@@ -12,6 +12,7 @@ from drawn_worlds import Case, Worlds, draw_worlds
 
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.collar import collar_tie
 from groundstation.survey.adjustment.looks import StartingPoint
 
 pytestmark = pytest.mark.slow
@@ -22,7 +23,7 @@ COVARIANCES = 5e-3  # of the largest and the smallest axis
 PLAY = 0.05  # of its variance
 CURVATURE = 0.25  # likewise; that of a leg is left where it moves by a fifth
 KNOWN_AS = 4.0  # looks that the play before them counts for
-HOLE_KNOWN_AS, LEG_KNOWN_AS = 6.0, 4.0  # directions that the curvature before them counts for
+HOLE_KNOWN_AS, LEG_KNOWN_AS = 1.0 / 3.0, 4.0  # directions that the curvature before them counts for
 LIKELY = 16.0  # square beyond which a look counts less
 
 
@@ -122,6 +123,21 @@ def test_directions_tubes_and_their_covariances_are_those_of_a_dense_solution(co
     assert stretched(compared) < COVARIANCES
     stds = np.sqrt(np.diag(found.common_cov))[: off.size]
     np.testing.assert_allclose(stds, np.sqrt(np.diag(there)), rtol=COVARIANCES)
+
+
+def test_the_collar_goes_with_its_leg_as_in_the_dense_solution(compared: Compared) -> None:
+    there, path = compared.there, compared.worlds.path
+    kept = np.exp(-path.md[1] / path.correlation_length)
+    turned = path.correlation_length * (1.0 - kept)
+    turns, bends = there.cov_of("direction")[:2], there.cov_of("direction", "curvature")[:2]
+    axes = np.arange(2)
+    with_start = bends[axes, axes].mean()
+    with_bend = turns[axes, axes + 2].mean() - turns[axes, axes].mean() - turned * with_start
+    with_change = bends[axes, axes + 2].mean() - kept * with_start
+    sizes = np.sqrt(turns[0, 0] * compared.found.now.curvature_var) * np.array([1.0, path.md[1], 1.0])
+    off = np.array(collar_tie(compared.found)) - [with_start, with_bend, with_change]
+    assert (np.abs(off) < 5e-3 * sizes).all()
+    assert with_start < -10.0 * 5e-3 * sizes[0]  # what leans more at the collar bends less from there
 
 
 def test_what_is_learnt_of_play_and_curvature_is_what_the_dense_solution_leaves(compared: Compared) -> None:

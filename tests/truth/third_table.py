@@ -169,6 +169,7 @@ def bad_day(random: np.random.Generator) -> Befalls:
     return replace(made, **{name: value for name, value in other.items() if name in chosen})
 
 
+LEANING = Disturbance(inclination_deg=30.0)
 LATE = Disturbance(crystal=0.01, **MPU)
 THIRD_ROWS: dict[str, Draw] = {
     "encoder stands for 1.2 s": lambda _: Befalls(stands_s=1.2),
@@ -176,7 +177,9 @@ THIRD_ROWS: dict[str, Draw] = {
     "encoder stands for 20 s": lambda _: Befalls(stands_s=20.0),
     "axes x and y exchanged": lambda _: Befalls(exchanged=True),
     "string creeps at rest, 0.005 to 0.02 deg/s": lambda r: Befalls(creep=math.radians(log_uniform(r, 0.004, 0.025))),
+    "the same at 30 deg of lean": lambda r: Befalls(LEANING, creep=math.radians(log_uniform(r, 0.004, 0.025))),
     "wound up slowly, 0.1 to 1 deg, let go at rest": _twist,
+    "wound up slowly, let go at rest, at 30 deg of lean": lambda r: replace(_twist(r), plain=LEANING),
     "backlash 0.1 deg, run-on within 0.1 to 3 s": lambda r: _play(r, 0.08, 4.0),
     "backlash 0.1 deg, run-on within 1 s": lambda r: _play(r, 1.0, 1.001),
     "backlash 0.1 deg, run-on within 3 s": lambda r: _play(r, 3.0, 3.001),

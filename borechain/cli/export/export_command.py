@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import datetime
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from borechain.cli.faults import plain_faults
+from borechain.cli.ground.query import rig_option, role_option
 from borechain.cli.survey.site_options import site_options
 from borechain.cli.survey.survey_options import NORTHS
 from borechain.cli.whole_files import write_whole
 from groundstation.survey.requests.survey_request import FrameRequest, SiteFigures, SurveyRequest
+from telemetry import keys
+from telemetry.runtime.process_options import insecure_option, keys_option
 from telemetry.runtime.typed_options import Option, gather_options
 
 if TYPE_CHECKING:
     from groundstation.survey.exports.export_hole import ExportSite
+    from groundstation.survey.exports.live_hole import LivePlace
 
 NAMES = ("ags", "diggs", "dxf", "geojson", "ifc", "las", "witsml")
 
@@ -35,9 +40,13 @@ def export() -> None:
 
 
 def file_options() -> tuple[Option, ...]:
+    """Options of what is exported of a file."""
+    return (click.argument("file", type=click.Path(path_type=Path)), *format_options())
+
+
+def format_options() -> tuple[Option, ...]:
     """Options of every export."""
     return (
-        click.argument("file", type=click.Path(path_type=Path)),
         click.option("--format", "form", type=click.Choice(NAMES), required=True, help="Of the file that is written."),
         click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="File to write."),
     )
@@ -68,6 +77,55 @@ wall_options = gather_options(
     click.option("--hole", metavar="NAME", help="Column that is to be written alone."),
     click.option("--grid-crs", default="", metavar="CODE", help="Grid of the wall's coordinates, such as EPSG:25833."),
 )
+
+
+@dataclass(frozen=True, slots=True)
+class RigAsked:
+    """A running rig, and the role that it is asked in."""
+
+    rig_name: str
+    endpoint: str
+    keys_place: Path | None
+    role: str
+
+    def to_site(self, place: LivePlace) -> ExportSite:
+        """The hole as its ground station answers it now."""
+        from borechain.client import connect_to_ground
+        from groundstation.survey.exports.live_hole import site_of_live
+
+        with connect_to_ground(self.endpoint, self.rig_name, keys_place=self.keys_place, role=self.role) as ground:
+            trajectory, column = ground.ask("trajectory"), ground.ask("column")
+        return site_of_live(self.rig_name, trajectory, column, place, day_of_file())
+
+
+live_options = gather_options(
+    *format_options(),
+    click.option("--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig."),
+    insecure_option,
+    rig_option,
+    keys_option,
+    role_option,
+    asked=RigAsked,
+)
+
+
+@export.command()
+@live_options
+@click.option("--origin", type=float, nargs=3, metavar="NORTHING EASTING HEIGHT", help="Coordinates of the collar, m.")
+@click.option("--grid-crs", default="", metavar="CODE", help="Grid of these coordinates, such as EPSG:25833.")
+@plain_faults
+def live(
+    asked: RigAsked, form: str, out: Path, origin: tuple[float, float, float] | None, grid_crs: str
+) -> None:  # fmt: skip
+    """Export the hole that a running rig drills, as surveyed now; its page has the same files.
+
+    \b
+    Example:
+      borechain export live --rig rig-1 --format dxf --out hole.dxf
+    """
+    from groundstation.survey.exports.live_hole import LivePlace
+
+    write_export(asked.to_site(LivePlace(origin, grid_crs)), form, None, out)
 
 
 @export.command()

@@ -24,10 +24,10 @@ TIMEOUT = "Timeout"  # zenoh's text for an answer that did not come
 rig_option = endpoint_option("Router of the rig.")
 role_option = click.option(
     "--role",
-    type=click.Choice(["operator", "driller"]),
+    metavar="NAME",
     default="operator",
     show_default=True,
-    help="Whose certificate of the folder --keys to show over TLS; only a driller may order.",
+    help="Whose certificate of the folder --keys to show over TLS: a person's, or that of all operators or drillers.",
 )
 
 

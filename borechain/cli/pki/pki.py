@@ -31,6 +31,9 @@ def pki() -> None:
     Examples:
       borechain pki init --rig rig-1
       borechain pki tube 7
+      borechain pki person anna --role driller
+      borechain pki revoke anna
+      borechain pki renew base
       borechain pki revoke 7
       borechain pki rotate
       borechain pki retire
@@ -90,27 +93,83 @@ def tube(tube: int, folder: Path) -> None:
 
 
 @pki.command()
-@tube_argument
+@click.argument("name")
+@click.option("--role", type=click.Choice(["operator", "driller"]), required=True, help="One reads, the other orders.")
 @folder_option
 @plain_faults
-def revoke(tube: int, folder: Path) -> None:
-    """Revoke TUBE, so that it is believed nothing, and make new keys for all others.
+def person(name: str, role: str, folder: Path) -> None:
+    """Make the certificate of a person, NAME.pem and NAME.key, good for half a year.
 
-    Take the new files to the base, the encoder and every tube that can be reached; a tube that has not got its file yet
-    goes on with its old keys, and lets TUBE speak where it is its neighbour.
+    Take access.json to the router, which follows it within seconds, and the person's two files to its machine.
 
     \b
     Example:
-      borechain pki revoke 7 --folder stick
+      borechain pki person anna --role driller --folder stick
     """
-    from borechain.pki.rig_keys import revoke_tube
+    from borechain.pki.rig_keys import add_person
     from telemetry.errors import KeyFileError
 
     try:
-        secret = revoke_tube(folder, tube, utc_now())
+        path = add_person(folder, name, role, utc_now())
     except KeyFileError as error:
         raise InputFault(str(error)) from error
-    click.echo(f"tube {tube} is revoked; generation {secret.generations[-1].number} is in every other file of {folder}")
+    click.echo(str(path))
+
+
+@pki.command()
+@click.argument("name")
+@folder_option
+@plain_faults
+def renew(name: str, folder: Path) -> None:
+    """Make the certificate of NAME anew: a person, router, base, encoder, depth, medium or tube-7.
+
+    The one of before stays good until its end. A router that runs takes its new files within seconds, a process at its
+    next connection; nothing has to be started again.
+
+    \b
+    Example:
+      borechain pki renew base --folder stick
+    """
+    from borechain.pki.rig_keys import renew_certificate
+    from telemetry.errors import KeyFileError
+
+    try:
+        path = renew_certificate(folder, name, utc_now())
+    except KeyFileError as error:
+        raise InputFault(str(error)) from error
+    click.echo(str(path))
+
+
+@pki.command()
+@click.argument("who", metavar="TUBE|NAME")
+@folder_option
+@plain_faults
+def revoke(who: str, folder: Path) -> None:
+    """Revoke a tube, so that it is believed nothing, and make new keys for all others; or shut out a person.
+
+    Of a person no keys change: take access.json to the router, which shuts the person out within seconds, and remove
+    its password with borechain pki password. Of a tube take the new files to the base, the encoder and every tube that
+    can be reached; a tube that has not got its file yet goes on with its old keys, and lets the revoked one speak where
+    it is its neighbour.
+
+    \b
+    Examples:
+      borechain pki revoke 7 --folder stick
+      borechain pki revoke anna --folder stick
+    """
+    from borechain.pki.access import ACCESS_FILE
+    from borechain.pki.rig_keys import revoke_person, revoke_tube
+    from telemetry.errors import KeyFileError
+
+    try:
+        if not who.lstrip("-").isdecimal():
+            revoke_person(folder, who)
+            click.echo(f"{who} is revoked; take {folder / ACCESS_FILE} to the router")
+            return
+        secret = revoke_tube(folder, int(who), utc_now())
+    except KeyFileError as error:
+        raise InputFault(str(error)) from error
+    click.echo(f"tube {who} is revoked; generation {secret.generations[-1].number} is in every other file of {folder}")
 
 
 @pki.command()
@@ -167,21 +226,34 @@ def retire(folder: Path) -> None:
     show_default=True,
     help="Where the hashes are kept, for --page-passwords.",
 )
+@click.option("--name", default="", metavar="PERSON", help="Of one person in that role, who signs in by this name.")
+@click.option("--remove", is_flag=True, help="Take the password away; its sessions end within seconds.")
 @plain_faults
-def password(role: str, path: Path) -> None:
+def password(role: str, path: Path, name: str, remove: bool) -> None:
     """Set the password of ROLE on the page: an operator reads, a driller orders. It is asked for, or read from a pipe.
 
     \b
-    Example:
+    Examples:
       borechain pki password driller --file passwords
+      borechain pki password driller --name anna --file passwords
+      borechain pki password driller --name anna --remove --file passwords
     """
     from borechain.pki.private_files import write_private
-    from groundstation.gateway.page.passwords import hash_of, read_passwords, text_of
+    from groundstation.gateway.page.passwords import hash_of, holder_of, read_passwords, text_of
 
     known = read_passwords(path) if path.exists() else {}
+    if "/" in name or len(name.split()) > 1 or not name.isascii():
+        raise InputFault(f"--name: expected a name of one word, got {name!r:.60}")
+    holder = holder_of(role, name)
+    if remove:
+        if holder not in known:
+            raise InputFault(f"{path}: expected one of {', '.join(sorted(known)) or 'none'}, got {holder}")
+        write_private(path, text_of({one: hashed for one, hashed in known.items() if one != holder}))
+        click.echo(f"{path}: {holder} has no password any more; its sessions end within seconds")
+        return
     text = click.prompt("Password", hide_input=True, confirmation_prompt=True) if stdin_is_terminal() else read_line()
-    write_private(path, text_of(known | {role: hash_of(text)}))
-    click.echo(f"{path}: password of {role}; borechain ground --page-passwords {path} takes it at its next start")
+    write_private(path, text_of(known | {holder: hash_of(text)}))
+    click.echo(f"{path}: password of {holder}; borechain ground --page-passwords {path} takes it at once")
 
 
 def stdin_is_terminal() -> bool:

@@ -25,6 +25,6 @@ def router(endpoint: str, keys_place: Path | None) -> None:
       borechain router --endpoint tcp/127.0.0.1:7447
       borechain router --endpoint tls/0.0.0.0:7447 --keys /etc/borechain
     """
-    from borechain.drilling.rig_host import run_router
+    from borechain.drilling.router_host import run_router
 
     run_router(endpoint, keys_place)

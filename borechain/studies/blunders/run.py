@@ -52,25 +52,27 @@ class BlunderRun:
     answer: AnswerGiven
 
 
-def count_steps(seeds: int, honest: int) -> int:
+def count_steps(seeds: int, honest: int, first: int) -> int:
     """Rigs of all kinds and sizes, and honest ones."""
+    del first
     return honest + seeds * sum(len(kind.sizes) for kind in KINDS)
 
 
-def run_study(seeds: int, honest: int, step: Step) -> dict[str, Any]:
-    """A row for each kind and size, and one of honest rigs; ``step`` is called after each rig."""
+def run_study(seeds: int, honest: int, first: int, step: Step) -> dict[str, Any]:
+    """A row for each kind and size, and one of honest rigs, drawn from a first number on; ``step`` after each rig."""
     places = [(kind, size) for kind in range(len(KINDS)) for size in range(len(KINDS[kind].sizes))]
     with over_cores(max(seeds, honest), step) as run_all:
-        of_honest = run_all(run_rig, [BlunderJob(draw) for draw in drawn_rigs(USUAL, honest)])
+        of_honest = run_all(run_rig, [BlunderJob(draw) for draw in drawn_rigs(USUAL, honest, first)])
         rows = []
         for kind, size in places:
-            runs = run_all(run_rig, [BlunderJob(draw, kind, size) for draw in drawn_rigs(USUAL, seeds)])
+            runs = run_all(run_rig, [BlunderJob(draw, kind, size) for draw in drawn_rigs(USUAL, seeds, first)])
             rows.append(blunder_row(KINDS[kind], size, runs))
     blamed = sum(bool(run.answer.causes) for run in of_honest)
     return {
         "experiment": "blunders",
         "seeds": seeds,
         "honest": honest,
+        "first": first,
         "blamed": blamed,
         "cases": [honest_row(of_honest), *rows],
     }

@@ -77,18 +77,20 @@ def sketch_cases() -> list[SketchCase]:
     ]
 
 
-def count_steps(seeds: int, rigs: int) -> int:
+def count_steps(seeds: int, rigs: int, first: int) -> int:
     """Rigs of both tables."""
+    del first
     return seeds + rigs * len(sketch_cases())
 
 
-def run_study(seeds: int, rigs: int, step: Step) -> dict[str, Any]:
+def run_study(seeds: int, rigs: int, first: int, step: Step) -> dict[str, Any]:
     """Both tables; ``step`` is called after each rig.
 
     Parameters
     ----------
     seeds : rigs of the first table
     rigs : of each row of the second
+    first : number from which the rigs of both are drawn
 
     Returns
     -------
@@ -96,22 +98,23 @@ def run_study(seeds: int, rigs: int, step: Step) -> dict[str, Any]:
         ``cases``: a row a station; ``sketch``: a row of the second table; ``traces``: what the figure shows.
     """
     with over_cores(max(seeds, rigs), step) as run_all:
-        runs = run_all(run_rig, drawn_rigs(USUAL, seeds))
-        sketch = [sketch_row(case, run_sketch(run_all, case, rigs)) for case in sketch_cases()]
+        runs = run_all(run_rig, drawn_rigs(USUAL, seeds, first))
+        sketch = [sketch_row(case, run_sketch(run_all, case, rigs, first)) for case in sketch_cases()]
     stations = min(len(run.judged.md) for run in runs)
     return {
         "experiment": "set-up",
         "seeds": seeds,
         "rigs": rigs,
+        "first": first,
         "cases": [station_row(place, runs) for place in range(stations)],
         "sketch": sketch,
         "traces": {"squares": np.array([run.judged.ellipsoid_squares[:stations] for run in runs])},
     }
 
 
-def run_sketch(run_all: RunAll, case: SketchCase, rigs: int) -> list[SetUpRun]:
+def run_sketch(run_all: RunAll, case: SketchCase, rigs: int, first: int) -> list[SetUpRun]:
     """Rigs of a row of the second table."""
-    return run_all(run_rig, drawn_rigs(case.known, rigs, stops_anywhere=FACES[case.faces]))
+    return run_all(run_rig, drawn_rigs(case.known, rigs, first, stops_anywhere=FACES[case.faces]))
 
 
 def run_rig(draw: RigDraw) -> SetUpRun:

@@ -21,13 +21,16 @@ from groundstation.service.process.ground_process import HEARTBEAT, GroundProces
 
 VERDICT = "verdict"
 BEATS_MISSED = 2  # after which a ground station that is asked is not taken for live
+READERS = 64  # streams at a time
+UNSIGNED_OF_ONE = 32  # of these, from one address without a session
 GATHER_S = 0.1  # for which changes are gathered into one packet
 
 
 class Reader:
     """One browser that follows the answers; ``changed`` are paths that it is to be given."""
 
-    def __init__(self, changed: Iterable[str]) -> None:
+    def __init__(self, changed: Iterable[str], address: str = "", *, is_signed: bool = False) -> None:
+        self.address, self.is_signed = address, is_signed
         self._changed = dict.fromkeys(changed)
         self._woken = asyncio.Event()
         self.is_closed = False
@@ -71,7 +74,7 @@ class Hub:
     def __init__(self, process: GroundProcess, *, is_replay: bool = False) -> None:
         self._process = process
         self._is_replay = is_replay
-        self._readers: set[Reader] = set()
+        self._readers: dict[Reader, None] = {}  # the oldest first
         self._rendered: dict[str, bytes] = {}
         self._beat_at = -math.inf  # s, monotonic, of the newest verdict
         process.listeners.append(self._on_change)
@@ -80,18 +83,34 @@ class Hub:
         """How many readers there are."""
         return len(self._readers)
 
-    def join(self) -> Reader:
-        """A reader that is given the whole picture first; a verdict only if it is of this moment."""
+    def join(self, address: str = "", *, is_signed: bool = False) -> Reader | None:
+        """A reader that is given the whole picture first; a verdict only if it is of this moment.
+
+        None where there is no place: those at one address who have not signed in have a share of the places, and give
+        way to who has.
+        """
+        if not self._make_room(address, is_signed=is_signed):
+            return None
         is_live = self._is_replay or time.monotonic() <= self._beat_at + BEATS_MISSED * HEARTBEAT
         known = answered_paths(self._process.model)
         followed = [path for path, one in known.items() if one.answer.on_page and (is_live or path != VERDICT)]
-        reader = Reader(followed)
-        self._readers.add(reader)
+        reader = Reader(followed, address, is_signed=is_signed)
+        self._readers[reader] = None
         return reader
+
+    def _make_room(self, address: str, *, is_signed: bool) -> bool:
+        unsigned = [reader for reader in self._readers if not reader.is_signed]
+        if not is_signed:
+            there = sum(reader.address == address for reader in unsigned)
+            return there < UNSIGNED_OF_ONE and len(self._readers) < READERS
+        if len(self._readers) >= READERS and unsigned:
+            unsigned[0].close()
+            self.leave(unsigned[0])
+        return len(self._readers) < READERS
 
     def leave(self, reader: Reader) -> None:
         """A reader has gone."""
-        self._readers.discard(reader)
+        self._readers.pop(reader, None)
 
     def close(self) -> None:
         """End every reader."""

@@ -19,6 +19,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Receive, Scope, Send
 
 from groundstation.gateway.page.answer_hub import Hub
+from groundstation.gateway.page.connections import SignedPeers
 from groundstation.gateway.page.openapi import openapi_document
 from groundstation.gateway.page.page_handlers import PageHandlers
 from groundstation.gateway.page.page_settings import PageSettings
@@ -49,9 +50,9 @@ class Files(StaticFiles):
         return response
 
 
-def page_application(process: GroundProcess, page: PageSettings, hub: Hub) -> Starlette:
+def page_application(process: GroundProcess, page: PageSettings, hub: Hub, signed: SignedPeers) -> Starlette:
     """Everything that the page's address serves."""
-    handlers = PageHandlers(process, page, hub, files_digest(), program_version())
+    handlers = PageHandlers(process, page, hub, signed, files_digest(), program_version())
 
     async def described(_request: Request) -> Response:
         return JSONResponse(openapi_document(program_version()))
@@ -81,6 +82,7 @@ def page_application(process: GroundProcess, page: PageSettings, hub: Hub) -> St
             Route("/api/cmd/{name}", handlers.order, methods=["POST"]),
             Route("/api/tables/{path:path}.csv", handlers.table),
             Route("/api/reports/{subject}.pdf", handlers.report),
+            Route("/api/exports/{what}.{form}", handlers.export),
             Route("/api/{path:path}", handlers.answer),
         ],
         middleware=[

@@ -6,6 +6,7 @@ import math
 import re
 from typing import Any
 
+from groundstation.gateway.page.exports import EXPORTED, MEDIA, PARAMETERS
 from groundstation.gateway.page.passwords import ROLES
 from groundstation.gateway.page.reports import SUBJECTS
 from groundstation.service.answers.answer_table import ANSWERS, AnswerKey
@@ -18,6 +19,10 @@ View = dict[str, Any]
 JSON_TYPES = {ValueKind.NUMBER: "number", ValueKind.INTEGER: "integer", ValueKind.BOOLEAN: "boolean"}
 REFUSED = {"type": "object", "properties": {"error": {"type": "string"}}, "required": ["error"]}
 TABLES = ("stations", "measurements")  # that the page has buttons for; others are had alike
+EXPORT_HELP = {
+    "origin": "NORTHING,EASTING,HEIGHT of the collar, m; a wall's file has its own",
+    "grid_crs": "code of the grid of those coordinates, such as EPSG:25833",
+}
 SIGN_IN = {
     "type": "object",
     "properties": {
@@ -55,7 +60,7 @@ def openapi_document(version: str) -> View:
             "description": "The keys of one rig over HTTP. Reading needs no session on loopback; ordering needs one of "
             "the role driller, and its csrf value in the header x-csrf-token.",
         },
-        "paths": answers | table_paths() | report_paths() | orders | session_paths() | stream_path(),
+        "paths": answers | table_paths() | report_paths() | export_paths() | orders | session_paths() | stream_path(),
         "components": {"securitySchemes": {"session": {"type": "apiKey", "in": "cookie", "name": "borechain"}}},
     }
 
@@ -98,6 +103,30 @@ def report_paths() -> View:
             }
         }
         for subject in SUBJECTS
+    }
+
+
+def export_paths() -> View:
+    """The hole and the wall as files of other programs."""
+    return {
+        f"/api/exports/{what}.{form}": {
+            "get": {
+                "operationId": f"export_{what}_{form}",
+                "parameters": [
+                    {"name": name, "in": "query", "schema": {"type": "string"}, "description": EXPORT_HELP[name]}
+                    for name in PARAMETERS
+                ],
+                "responses": {
+                    "200": {
+                        "description": f"what is known of the {what} now",
+                        "content": {media: {"schema": {"type": "string"}}},
+                    }
+                }
+                | error_responses(400, 401, 404, 409, 501),
+            }
+        }
+        for what in EXPORTED
+        for form, media in MEDIA.items()
     }
 
 

@@ -14,8 +14,19 @@ from starlette.types import Receive, Scope, Send
 
 from groundstation.errors import GroundError, SelectorError
 from groundstation.gateway.page.answer_hub import Hub, server_sent_event
+from groundstation.gateway.page.connections import SignedPeers
+from groundstation.gateway.page.exports import live_export
 from groundstation.gateway.page.page_settings import PageSettings
-from groundstation.gateway.page.passwords import DRILLER, LONGEST, is_right
+from groundstation.gateway.page.passwords import (
+    DRILLER,
+    LONGEST,
+    NEVER,
+    PasswordBook,
+    find_holder,
+    holder_of,
+    is_right,
+    roles_of,
+)
 from groundstation.gateway.page.reports import ReportTypesetter
 from groundstation.gateway.page.request_guard import RequestError, check_origin, json_body, text_of
 from groundstation.gateway.page.sessions import OperatorSession, Sessions, WrongPasswords, is_from
@@ -26,9 +37,8 @@ from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.operator_access import check_name
 from telemetry.errors import TelemetryError
 
-READERS = 64  # streams at a time
-SILENCE_S = 10.0  # after which a stream without news sends a comment, so that its reader knows that it is there
-SLOW_S = 30.0  # for which a packet may wait for its reader
+SILENCE_S = 5.0  # after which a stream without news sends a comment, so that its reader knows that it is there
+SLOW_S = 10.0  # for which a packet may wait for its reader
 ANSWERED_WITHIN_S = 30.0  # longest wait of a request for the end of its order
 COOKIE = "borechain"
 CSRF = "x-csrf-token"
@@ -44,12 +54,16 @@ class PageHandlers:
     process : the ground station
     page : who may order, and whether everybody may read
     hub : where its answers are followed
+    signed : connections of who is signed in, for those who keep the connections
     build : name of what is served, by which a page that is older than the program knows it
     version : of the program
     """
 
-    def __init__(self, process: GroundProcess, page: PageSettings, hub: Hub, build: str, version: str) -> None:
-        self._process, self._page, self._hub, self._build = process, page, hub, build
+    def __init__(
+        self, process: GroundProcess, page: PageSettings, hub: Hub, signed: SignedPeers, build: str, version: str
+    ) -> None:
+        self._process, self._page, self._hub, self._signed, self._build = process, page, hub, signed, build
+        self._passwords = PasswordBook(page.passwords, page.password_file)
         self._sessions = Sessions()
         self._wrong = WrongPasswords()
         self._reporter = ReportTypesetter(process.model, version)
@@ -87,6 +101,13 @@ class PageHandlers:
         name, made = await self._reporter.pdf(request.path_params["subject"])
         return Response(made, media_type="application/pdf", headers=saved_as(name))
 
+    async def export(self, request: Request) -> Response:
+        """``GET /api/exports/hole.FORMAT`` and ``wall.FORMAT``: a file of another program."""
+        self._check_reader(request)
+        what, form = request.path_params["what"], request.path_params["form"]
+        name, media, made = await live_export(self._process.model, what, form, dict(request.query_params))
+        return Response(made, media_type=media, headers=saved_as(name))
+
     async def order(self, request: Request) -> Response:
         """``POST /api/cmd/NAME``: order something; ``?wait=true`` answers when the tube has."""
         session = self._check_driller(request)
@@ -112,10 +133,11 @@ class PageHandlers:
             check_name(name)
         except SelectorError as error:
             raise RequestError(400, str(error).replace("by:", "name:")) from error
-        if not self._page.passwords:
-            raise RequestError(403, "sign-in is off: the ground station was started without --page-passwords")
-        await self._check_password(role, password, address_of(request))
-        session = self._sessions.begin(role, name.strip(), time.monotonic())
+        if not self._passwords.current():
+            off = self._passwords.fault or "the ground station was started without --page-passwords"
+            raise RequestError(403, f"sign-in is off: {off}")
+        holder, hashed = await self._check_password(role, name.strip(), password, request)
+        session = self._sessions.begin(role, name.strip(), time.monotonic(), holder, hashed)
         response = JSONResponse(self._shown(session))
         response.set_cookie(
             COOKIE, session.token, httponly=True, samesite="strict", secure=self._page.certificate is not None, path="/"
@@ -136,10 +158,12 @@ class PageHandlers:
 
     async def stream(self, scope: Scope, receive: Receive, send: Send) -> None:
         """``GET /api/stream``: every answer of the page, and then what changes, as server-sent events."""
-        self._check_reader(Request(scope))
-        if len(self._hub) >= READERS:
-            raise RequestError(503, f"{READERS} browsers follow this rig already; close one", retry_after=10.0)
-        reader = self._hub.join()
+        request = Request(scope)
+        self._check_reader(request)
+        session = self._session_of(request)
+        reader = self._hub.join(address_of(request), is_signed=session is not None)
+        if reader is None:
+            raise RequestError(503, "as many browsers follow this rig as may; sign in, or close one", retry_after=10.0)
         gone = asyncio.create_task(gone_reader(receive, reader.close))
         try:
             headers = [(b"content-type", b"text/event-stream"), (b"cache-control", b"no-store")]
@@ -149,6 +173,8 @@ class PageHandlers:
             )
             while not reader.is_closed:
                 changed = await reader.changes(SILENCE_S)
+                if session is not None and self._session_of(request) is None:
+                    break  # the page comes again by itself, as who it is now
                 await send_chunk(send, self._hub.packet(changed) or b": nothing new\n\n")
             await send({"type": "http.response.body", "body": b"", "more_body": False})
         except TimeoutError:
@@ -169,21 +195,31 @@ class PageHandlers:
             "csrf": None if session is None else session.csrf,
             "reads": session is not None or self._page.is_local,
             "orders": session is not None and session.role == DRILLER,
-            "roles": sorted(self._page.passwords),
+            "roles": roles_of(self._passwords.current()),
         }
 
-    async def _check_password(self, role: str, password: str, address: str) -> None:
-        now = time.monotonic()
-        if hold := self._wrong.hold_of(address, now):
-            raise RequestError(429, f"too soon after a wrong password; wait {math.ceil(hold)} s", retry_after=hold)
-        async with self._one_at_a_time:
-            known = self._page.passwords.get(role)
-            hashed = known or next(iter(self._page.passwords.values()))  # an unknown role takes as long
+    async def _check_password(self, role: str, name: str, password: str, request: Request) -> tuple[str, str]:
+        """Under what a right password is kept, and its hash.
+
+        Raises
+        ------
+        RequestError
+            When it is wrong, or comes too soon after a wrong one.
+        """
+        address, who = address_of(request), holder_of(role, name)
+        async with self._one_at_a_time:  # those who wait here see what the one before them has brought about
+            if hold := self._wrong.hold_of(address, time.monotonic(), who):
+                raise RequestError(429, f"too soon after a wrong password; wait {math.ceil(hold)} s", retry_after=hold)
+            if await request.is_disconnected():
+                raise RequestError(408, "the connection ended before the answer")
+            known = self._passwords.current()
+            holder = find_holder(known, role, name)
+            hashed = known[holder] if holder is not None else next(iter(known.values()), NEVER)  # takes as long
             right = await asyncio.to_thread(is_right, password, hashed)
-        if right and known is not None:
-            self._wrong.forgive(address)
-            return
-        row, hold = self._wrong.add(address, time.monotonic())
+            if right and holder is not None:
+                self._wrong.forgive(address, who)
+                return holder, hashed
+            row, hold = self._wrong.add(address, time.monotonic(), who)
         self._process.endpoint.counters["wrong_passwords"] += 1
         told = f"{self._wrong.total} since the ground station started, the last from {address}"
         self._process.model.rig_alarms.alert("wrong_password", "page", told)
@@ -191,7 +227,13 @@ class PageHandlers:
         raise RequestError(401, f"wrong password or role{times}; the next try is looked at in {hold:.0f} s")
 
     def _session_of(self, request: Request) -> OperatorSession | None:
-        return self._sessions.find(request.cookies.get(COOKIE), time.monotonic())
+        session = self._sessions.find(request.cookies.get(COOKIE), time.monotonic())
+        if session is not None and session.holder and self._passwords.current().get(session.holder) != session.hashed:
+            self._sessions.end(session)  # its password is another one now, or none
+            return None
+        if session is not None and request.client is not None:
+            self._signed.add(request.client)
+        return session
 
     def _check_reader(self, request: Request) -> None:
         if not self._page.is_local and self._session_of(request) is None:

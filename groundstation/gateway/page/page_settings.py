@@ -11,12 +11,12 @@ from pathlib import Path
 from groundstation.errors import ConfigurationError, PageError
 from telemetry.media.credentials import needs_tls
 
-BACKLOG = 64  # connections that wait to be accepted
+BACKLOG = 1024  # connections that wait to be accepted
 
 
 @dataclass(frozen=True, slots=True)
 class PageSettings:
-    """Address of the page, its certificate and key for TLS, and the hash of the password of each role.
+    """Address of the page, its certificate and key for TLS, and the hash of each password, with the file they are in.
 
     ``replay`` names the recording that is shown in place of a rig that lives.
     """
@@ -26,6 +26,7 @@ class PageSettings:
     certificate: Path | None = None
     key: Path | None = None
     passwords: Mapping[str, str] = field(default_factory=dict)
+    password_file: Path | None = None
     replay: str = ""
 
     @property

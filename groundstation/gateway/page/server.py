@@ -12,10 +12,10 @@ import uvicorn
 
 from groundstation.gateway.page.answer_hub import Hub
 from groundstation.gateway.page.application import page_application
+from groundstation.gateway.page.connections import SignedPeers, protocol_with
 from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.service.process.ground_process import GroundProcess
 
-CONNECTIONS = 200  # at a time; a later one is told to come again
 IDLE_S = 10.0  # for which a connection may have no request, or be closing
 SWEEP_S = 1.0
 LARGEST_HEAD = 16_384  # bytes of a request before its body
@@ -114,16 +114,16 @@ def close_all(server: uvicorn.Server) -> None:
 async def serving_page(process: GroundProcess, page: PageSettings, listening: socket.socket) -> AsyncIterator[None]:
     """Have the page served on a listening socket while the context lasts."""
     hub = Hub(process, is_replay=bool(page.replay))
+    signed = SignedPeers()
     config = uvicorn.Config(
-        page_application(process, page, hub),
-        http="h11",
+        page_application(process, page, hub, signed),
+        http=protocol_with(signed),
         ws="none",
         lifespan="off",
         log_config=None,
         access_log=False,
         server_header=False,
         proxy_headers=False,
-        limit_concurrency=CONNECTIONS,
         h11_max_incomplete_event_size=LARGEST_HEAD,
         timeout_graceful_shutdown=LAST_WORDS_S,
         ssl_certfile=page.certificate,

@@ -94,6 +94,7 @@ KINDS: tuple[AlarmKind, ...] = (
     AlarmKind("page_restarted", NOTICE, "the page's web server has failed and was started again"),
     AlarmKind("seal_refused", NOTICE, "frames or messages were forged or repeated; they had no effect"),
     AlarmKind("key_file", DEGRADED, "the key file was changed and cannot be used, or holds keys that should be ended"),
+    AlarmKind("certificate", DEGRADED, "a certificate ends within a month, or its dates are not those of this machine"),
 )
 KIND_OF = {kind.code: kind for kind in KINDS}
 

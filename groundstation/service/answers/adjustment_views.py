@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -126,12 +126,15 @@ def budget_of_toe(k: RigModel, examined: ExaminedHole) -> list[NamedShare]:
 
     The last two are those of the trajectory, which are in no look.
     """
+    drawn = k.hole.trajectory
     shares = [NamedShare(*examined.share_name(one), one.variances) for one in examined.shares]
+    tied = np.diagonal(drawn.tied_covs[-1])  # bends move the collar's direction and the first leg against each other
+    shares = [replace(one, variances=one.variances + tied) if one.source == "path" else one for one in shares]
     return [
         NamedShare("north", "", north_at_toe(k)),
         *shares,
         NamedShare("depth", "", k.hole.toe_by_depth),
-        NamedShare("legs", "", np.diagonal(k.hole.trajectory.path_covs[-1])),
+        NamedShare("legs", "", np.diagonal(drawn.path_covs[-1])),
     ]
 
 

@@ -39,7 +39,8 @@ def setup_costs(k: RigModel, items: list[SetupItem], course: Trajectory) -> Mapp
     if examined is not None:
         found: dict[str, Array] = defaultdict(lambda: np.zeros(3))
         found |= {item.name: np.zeros(3) for item in items if item.kind in ADJUSTED_KINDS}  # also of what read nothing
-        found[SetupKind.PATH.value] = np.diagonal(k.hole.trajectory.path_covs[-1]).copy()
+        drawn = k.hole.trajectory
+        found[SetupKind.PATH.value] = np.diagonal(drawn.path_covs[-1] + drawn.tied_covs[-1]).copy()
         for name, variances in _shares_by_item(examined, items):
             found[name] += variances
         costs |= {name: std_across(variances) for name, variances in found.items()}

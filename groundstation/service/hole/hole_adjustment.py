@@ -23,7 +23,7 @@ from groundstation.service.hole.string_prior import Hanging, prior_of_string
 from groundstation.survey.adjustment.blunders import Examination
 from groundstation.survey.adjustment.looks import OF_TUBE, Looks, PathPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
-from groundstation.survey.fusion.packed import Packed
+from groundstation.survey.fusion.packed import Packed, short_places
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR, SphereDirection, tangent_errors
@@ -95,10 +95,10 @@ class HoleAdjustment:
         rows = below[np.lexsort((table["tube"][below], table["at"][below]))]
         if not len(rows):
             return None
-        path = self.path_of(mds, collar)
+        path, of_stops = self.path_of(mds, collar), table[rows]
         forces = stops.mean_forces(rows)
-        seen = self._looked_at(table[rows], forces, station_of_row[rows], path, self._chains)
-        seen = replace(seen, start=self._beginnings.start_of(rows, table[rows], seen))
+        seen = self._looked_at(of_stops, forces, station_of_row[rows], path, self._chains)
+        seen = replace(seen, start=self._beginnings.start_of(rows, of_stops, seen))
         return seen.examine() if self._search is None else self._search.examine(number, seen)
 
     def _looked_at(self, seen: Rows, forces: Array, station: Places, path: PathPrior, chains: HungChains) -> LookedAt:
@@ -172,6 +172,7 @@ def directions_of(examination: Examination, shared: SharedErrors, north_std: flo
     columns = np.concatenate([np.swapaxes(bases, 1, 2) @ of_looks, turned[:, :, None]], axis=2)
     places = shared.adjusted_places(columns.shape[2])
     width = shared.count
+    places = short_places(places, width)
     found = []
     for tangent, cov, values in zip(tangents, own, columns, strict=True):
         found.append(SphereDirection(tangent, cov, Packed.of_values(values, places, width)))

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from groundstation.errors import SurveyError
+from groundstation.survey.wall.as_built import TOE
 from groundstation.survey.wall.column_plans import ColumnPlan, ColumnStatus, ColumnSurvey
 from groundstation.survey.wall.judged_wall import judge_wall, part_around
 from groundstation.survey.wall.wall_columns import build_wall
@@ -63,7 +64,7 @@ class LiveWall:
         self.hole = hole
         self.inputs = whole.file.digests()
         self._wall, self._own = part_around(whole, names.index(hole))
-        self._known: tuple[bytes, int] | None = None
+        self._known: tuple[bytes, float | None] | None = None
         self._judged = Neighbourhood(self._wall, self._own, None, "nothing has been judged yet")
 
     def judged(self, survey: ColumnSurvey, bit: float | None) -> Neighbourhood:
@@ -72,15 +73,16 @@ class LiveWall:
         The survey counts from the north that the stations of the wall's file count from.
         """
         arrays = (survey.md, survey.inclination, survey.azimuth, *(() if survey.covs is None else (survey.covs,)))
-        known = (b"".join(array.tobytes() for array in arrays), self.plane_of(bit))
+        known = (b"".join(array.tobytes() for array in arrays), bit)
         if known != self._known:
             self._known = known
             self._judged = self._judge(survey, bit or 0.0)
         return self._judged
 
     def plane_of(self, bit: float | None) -> int:
-        """Number of the plane that a bit (m) has passed last."""
-        return int((bit or 0.0) / self._wall.file.assumed.step)
+        """Number that grows where a bit (m) has passed one more plane, and where it has come to the toe."""
+        md = bit or 0.0
+        return int(md / self._wall.file.assumed.step) + (md >= self._wall.plans[self._own].design.length - TOE)
 
     def _judge(self, survey: ColumnSurvey, bit: float) -> Neighbourhood:
         file, own = self._wall.file, self._own

@@ -24,7 +24,7 @@ def variances_by_source(
     north_std : rad, of the encoder's zero
     """
     found = _of_directions(drawn, shared, examined, north_std)
-    for name, covs in (("depth", drawn.depth_covs), ("path", drawn.path_covs)):
+    for name, covs in (("depth", drawn.depth_covs), ("path", drawn.path_covs + drawn.tied_covs)):
         found[name] = found.get(name, 0.0) + np.diagonal(covs, axis1=1, axis2=2)
     rest = np.diagonal(drawn.covs, axis1=1, axis2=2) - sum(found.values())
     return {"random": np.maximum(rest, 0.0)} | found

@@ -50,6 +50,7 @@ from telemetry.transport.authentication import read_key
 from telemetry.unwritten import Content
 
 if TYPE_CHECKING:
+    from groundstation.service.alarms.certificate_watch import CertificateWatch
     from telemetry.application.seals import Seals
 
 STARTS = 1 << 31  # numbers of a start by lot
@@ -122,6 +123,11 @@ class GroundProcess(Process):
         self.watch = Watch(model.string, model.hole, model.placement, model.rig_alarms, config.stale_after)
         self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=start, seals=seals)
         self._seal_watch = SealWatch(self.endpoint, self._on_refused)
+        self._certificates: CertificateWatch | None = None
+        if config.keys is not None:
+            from groundstation.service.alarms.certificate_watch import CertificateWatch
+
+            self._certificates = CertificateWatch(config.keys, model.rig_alarms)
         self.clock: RigClock = self.endpoint.clock
         self.tape = Tape()
         self.start_number = start
@@ -265,6 +271,8 @@ class GroundProcess(Process):
         alarms.hold(
             "key_file", "ground station", self.endpoint.seals.trouble if self.endpoint.seals is not None else ""
         )
+        if self._certificates is not None:
+            self._certificates.look(now)
         for tube, (first, last) in self.watch.gaps_to_ask(now):
             self._ask_again(tube, first, last)
         self.operator.expire_orders(now)

@@ -103,7 +103,7 @@ def adjust_hole(
         if not is_learnt:
             play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)
             if again and not is_bent:  # the first step was not along the sphere
-                whole, legs = learnt_curvature(found)
+                whole, legs, below = learnt_curvature(found)
                 is_bent = bool(np.all(np.abs(np.log(legs / now.leg_vars)) <= LEGS_SETTLED))
             is_learnt = step < NEAR and abs(play - now.play_var) <= PLAY_SETTLED * now.play_var and is_bent
         is_learnt |= again >= ITERATIONS
@@ -114,7 +114,7 @@ def adjust_hole(
             now = replace(now, play_var=faster_play(tried) if tried else play)
         if again and not is_learnt and not is_bent:
             between = swing.part_of_way(np.append(now.leg_vars, now.curvature_var), np.append(legs, whole))
-            now = replace(now, curvature_var=float(between[-1]), leg_vars=between[:-1])
+            now = replace(now, curvature_var=float(between[-1]), curvature_below=below, leg_vars=between[:-1])
     return found
 
 
@@ -203,6 +203,7 @@ def _stepped(now: StartingPoint, bases: Array, solution: LinearSolution, turns: 
         now.gravity + float(solution.common[size]),
         now.play_var,
         now.curvature_var,
+        now.curvature_below,
         now.leg_vars,
         now.extra + solution.common[make_ups.stop :],
     )

@@ -16,6 +16,7 @@ from groundstation.survey.adjustment.equations import KNOWN, STATE, leg_steps
 from groundstation.survey.adjustment.looks import PathPrior
 from groundstation.survey.adjustment.scores import best_sizes
 from groundstation.survey.adjustment.sphere import bends_between
+from groundstation.survey.path.leg_wander import UNTIED, CollarTie
 
 Array = npt.NDArray[np.float64]
 WIDE_COLLAR = 0.5  # rad, of a collar that was told wrong, before the stations tell it
@@ -39,27 +40,51 @@ def collar_departure(found: Adjusted) -> CollarDeparture:
     """Departure of the collar as it was told, in the axes of the collar of an adjustment.
 
     What the first station says, direction and curvature, is compared with what the collar leads to down a leg that
-    bends as the hole does on the whole: were it taken to bend as sharply as it seems to, no collar would ever be wrong.
+    bends as the hole does below it: were it taken to bend as sharply as it seems to, no collar would ever be wrong.
     """
     bases, now = found.bases, found.now
     if len(now.tangents) < 2:
         return CollarDeparture(np.zeros(2), np.eye(2), 0.0, 0)
     go, rigid = leg_steps(found.path)
-    at_collar = np.zeros((STATE, STATE))
-    at_collar[:2, :2] = bases[0] @ found.path.collar_cov @ bases[0].T + KNOWN * np.eye(2)
-    at_collar[2:, 2:] = found.path.curvature_std**2 * np.eye(2)
-    led_to, by_leg = go[0] @ at_collar @ go[0].T, np.asarray(np.linalg.inv(rigid[0]), np.float64)
+    told = bases[0] @ found.path.collar_cov @ bases[0].T + KNOWN * np.eye(2)
+    by_leg = np.asarray(np.linalg.inv(rigid[0]), np.float64)
+    led_to, leads_to = (led_down(go[0], told, var) for var in (now.curvature_var, now.curvature_below))
     known = np.asarray(np.linalg.inv(found.cov_at(1)), np.float64)
     ends = np.stack([now.tangents[0], found.path.collar, now.tangents[0], now.tangents[1]])
     to_told, _, to_station = bends_between(ends, bases[:1].repeat(4, axis=0))
     pulled = known @ np.concatenate([to_station - to_told, now.curvatures[1]])
     # the station without what it has from the collar, which leads to no bend and no curvature
     own = known - np.linalg.inv(led_to + now.leg_vars[0] * by_leg)
-    weight = np.linalg.inv(np.eye(STATE) + own @ (led_to + now.curvature_var * by_leg))
+    weight = np.linalg.inv(np.eye(STATE) + own @ (leads_to + now.curvature_below * by_leg))
     down = go[0][:, :2]
     free = down.T @ weight @ own @ down
     sizes, _, told, squares = best_sizes(-(down.T @ weight @ pulled)[None], free[None], free[None])
     return CollarDeparture(sizes[0], np.asarray(np.linalg.pinv(free), np.float64), float(squares[0]), int(told[0]))
+
+
+def collar_tie(found: Adjusted) -> CollarTie:
+    """How the direction at the collar of an adjustment goes with the curvature of its first leg."""
+    if len(found.path.md) < 2:
+        return UNTIED
+    one = np.zeros((len(found.path.md), 2, 2))
+    one[0] = np.eye(2)
+    states, _ = found.cofactor(one, np.zeros((len(found.common_cov), 2)))
+    departs = states[1] - leg_steps(found.path)[0][0] @ states[0]
+    return CollarTie(*(0.5 * float(np.trace(part)) for part in (states[0, 2:], departs[:2], departs[2:])))
+
+
+def led_down(go: Array, told: Array, curvature_var: float) -> Array:
+    """Covariance (4, 4) to which a collar leads at the first station, by a leg that adds nothing.
+
+    Parameters
+    ----------
+    go : (4, 4), how direction and curvature go on
+    told : (2, 2) rad^2, of the direction at the collar
+    curvature_var : rad^2/m^2, of the curvature there
+    """
+    at_collar = np.zeros((STATE, STATE))
+    at_collar[:2, :2], at_collar[2:, 2:] = told, curvature_var * np.eye(2)
+    return np.asarray(go @ at_collar @ go.T)
 
 
 def untold_collar(path: PathPrior) -> PathPrior:

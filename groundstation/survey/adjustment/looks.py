@@ -122,7 +122,8 @@ class StartingPoint:
     Parameters
     ----------
     tangents, curvatures, tubes, make_ups, gravity, extra : the unknowns
-    play_var, curvature_var, leg_vars : how far tubes lie askew, and how the hole bends, as the looks have told it
+    play_var, curvature_var, curvature_below, leg_vars : how far tubes lie askew, and how the hole bends, as the looks
+        have told it
     is_learnt : these are learnt of so many looks that a few more do not change them, and stay as they are
     """
 
@@ -133,6 +134,7 @@ class StartingPoint:
     gravity: float
     play_var: float
     curvature_var: float  # rad^2/m^2, of the hole
+    curvature_below: float  # rad^2/m^2, of the legs below the first alone
     leg_vars: Array  # (s,) rad^2/m^2, by which each leg is driven
     extra: Array = field(default_factory=lambda: np.zeros(0))
     is_learnt: bool = False

@@ -30,7 +30,7 @@ def first_start(looks: Looks, string: StringPrior, path: PathPrior) -> StartingP
     curvatures = np.zeros((len(path.md), 2))
     bends = path.curvature_std**2
     legs = np.full(len(path.md) - 1, bends)
-    return StartingPoint(tangents, curvatures, tubes, make_ups, string.gravity, string.play_std**2, bends, legs)
+    return StartingPoint(tangents, curvatures, tubes, make_ups, string.gravity, string.play_std**2, bends, bends, legs)
 
 
 def _turns(looks: Looks, string: StringPrior, turns: Array) -> Array:

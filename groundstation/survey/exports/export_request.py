@@ -83,13 +83,11 @@ def site_of_wall(wall: Wall, judgement: Judgement, day: datetime.date, crs: str 
 
 
 def _verdict(wall: Wall, judgement: Judgement, k: int) -> str:
-    """Worst of what is found of a column and of its joints; a tight one has nothing."""
-    name = wall.plans[k].design.name
-    mine = {
-        finding.kind
-        for finding in judgement.findings
-        if name in finding.what.split("-") or finding.what in (name, "wall")
-    }
+    """Worst finding of a column, of its joints and of the columns at their other ends; a tight one has none."""
+    beside = {k, *wall.pairs[np.any(wall.pairs == k, axis=1)].ravel().tolist()}
+    names = [wall.plans[n].design.name for n in beside]
+    own = wall.plans[k].design.name
+    mine = {finding.kind for finding in judgement.findings if finding.what in (*names, "wall") or finding.is_about(own)}
     if mine & set(OPEN):
         return "not tight"
     return "not proven" if mine else "tight"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import numpy as np
+
 from groundstation.errors import SurveyError
 from groundstation.survey.exports.export_hole import ExportHole, ExportSite
 
@@ -15,13 +17,18 @@ def geojson_bytes(site: ExportSite) -> bytes:
     Raises
     ------
     SurveyError
-        When the coordinates are of no national grid: the format has longitudes and latitudes alone.
+        When the coordinates are of no national grid, or none that is known, or lie outside it: the format has
+        longitudes and latitudes alone.
     """
     if not site.crs:
         raise SurveyError("geojson: expected --grid-crs and --origin; the format has longitudes and latitudes alone")
     from pyproj import Transformer  # an extra
+    from pyproj.exceptions import CRSError
 
-    to_degrees = Transformer.from_crs(site.crs, "EPSG:4326", always_xy=True)
+    try:
+        to_degrees = Transformer.from_crs(site.crs, "EPSG:4326", always_xy=True)
+    except CRSError as error:
+        raise SurveyError(f"--grid-crs: expected a grid such as EPSG:25833, got {site.crs!r}: {error!s:.60}") from None
     features = [_feature(hole, to_degrees) for hole in site.holes]
     collection = {"type": "FeatureCollection", "features": features}
     return (json.dumps(collection, allow_nan=False) + "\n").encode()
@@ -29,6 +36,9 @@ def geojson_bytes(site: ExportSite) -> bytes:
 
 def _feature(hole: ExportHole, to_degrees: Any) -> dict[str, Any]:
     longitude, latitude = to_degrees.transform(hole.axis[:, 0], hole.axis[:, 1])
+    if not (np.isfinite(longitude).all() and np.isfinite(latitude).all()):
+        east, north, _ = hole.axis[0].tolist()
+        raise SurveyError(f"{hole.name}: easting {east:g} m and northing {north:g} m lie outside the grid")
     places = [
         list(place) for place in zip(longitude.tolist(), latitude.tolist(), hole.axis[:, 2].tolist(), strict=True)
     ]

@@ -16,8 +16,10 @@ LEAN, DOWN = map(attrgetter, ("lean", "down"))
 
 def tangents_of(directions: Sequence[Direction]) -> Array:
     """Downhole unit vectors (n, 3)."""
-    leans, downs = np.array([*map(LEAN, directions)]).reshape(-1, 2), np.array([*map(DOWN, directions)])
-    return np.concatenate([leans, downs[:, None]], axis=1)
+    tangents = np.empty((len(directions), 3))
+    if directions:
+        tangents[:, :2], tangents[:, 2] = [*map(LEAN, directions)], [*map(DOWN, directions)]
+    return tangents
 
 
 def tangent_jacobians(tangents: Array) -> Array:

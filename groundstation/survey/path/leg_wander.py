@@ -12,6 +12,11 @@ is at the lower one is against it (a), so that legs next to each other undo a pa
 
 with the variance v of a leg's own moment. Of legs much shorter than the correlation length l, v is
 sigma^2 L^5 / (60 l), and a hole many l long gathers one sixth of it a leg.
+
+The direction at the collar is in no look. Where the stations tell it better than the crew, it is carried up to the
+collar by the curvature, so what it errs by is the same curvature that the first leg leaves its arc by: a hole that
+begins more to the north than was thought then leaves the arc to the south. Of a hole whose curvature is known at the
+first station and wanders from there up, the two together come to 0.6 L^5 / 12 and not to 1.1 L^5 / 12.
 """
 
 from __future__ import annotations
@@ -66,6 +71,24 @@ class LegWander:
         return self.std**2 * max(moment.variance + 2.0 * moment.with_start * memory, 0.0)
 
 
+class CollarTie(NamedTuple):
+    """How what is not known of the direction at the collar goes with the first leg, each way across the hole.
+
+    Covariances of that direction with the curvature at the collar (rad^2/m), and with direction and curvature at the
+    first station as they depart from what the collar leads to (rad^2 and rad^2/m).
+    """
+
+    with_curvature: float
+    with_bend: float
+    with_change: float
+
+    def moment_covariance(self, leg: float, share: float, correlation_length: float) -> float:
+        """Covariance (rad m) of the direction at the collar with the moment at a share of the first leg (m)."""
+        gains = moment_gains(round(leg, SAME), round(share, SAME), correlation_length)
+        return float(np.dot(gains, self))
+
+
+UNTIED: Final = CollarTie(0.0, 0.0, 0.0)  # a direction at the collar that is known by itself
 STEADY: Final = LegWander(0.0, 1.0)  # a path that does what its arcs do
 
 
@@ -86,3 +109,16 @@ def arc_moment(leg: float, share: float, correlation_length: float) -> ArcMoment
     with_end = rest[CURVATURE, CURVATURE] * there[OFFSET, CURVATURE] - by_turn * end[DIRECTION, CURVATURE]
     kept = float(whole[CURVATURE, CURVATURE])
     return ArcMoment(max(float(variance), 0.0), float(with_start), float(with_end), kept)
+
+
+@lru_cache(maxsize=64)  # only first legs are asked for
+def moment_gains(leg: float, share: float, correlation_length: float) -> Array:
+    """Moment (3,) at a share of a leg (m), as its ends tell it: for one unit of each of what `CollarTie` names."""
+    to_place, noise = process_step(share * leg, correlation_length)
+    whole, whole_noise = process_step(leg, correlation_length)
+    rest, _ = process_step((1.0 - share) * leg, correlation_length)
+    by_turn, ends = 0.5 * share * share * leg, (DIRECTION, CURVATURE)
+    with_ends = (rest @ noise)[ends, OFFSET] - by_turn * whole_noise[ends, DIRECTION]
+    by_ends = np.linalg.solve(whole_noise[np.ix_(ends, ends)], with_ends)
+    by_start = to_place[OFFSET, CURVATURE] - by_turn * whole[DIRECTION, CURVATURE]
+    return np.array([by_start, *by_ends])

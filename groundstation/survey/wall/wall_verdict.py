@@ -69,6 +69,10 @@ class Finding:
     text: str
     probability: float | None = None
 
+    def is_about(self, column: str) -> bool:
+        """Whether it is about a column or what the column is part of; names may hold dashes themselves."""
+        return f"-{column}-" in f"-{self.what}-"
+
 
 @dataclass(frozen=True, slots=True)
 class VoidFinding:

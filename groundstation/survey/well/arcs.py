@@ -32,6 +32,8 @@ def arc_displacements(lengths: Array, upper: Array, lower: Array) -> Array:
     chords = lower - upper
     bends = 2.0 * np.arcsin(np.minimum(0.5 * np.sqrt((chords * chords).sum(axis=-1)), 1.0))
     bent = (bends > SMALL) & (bends < math.pi - OPPOSITE)
+    if bent.all():
+        return np.asarray((0.5 * lengths * (2.0 / bends * np.tan(0.5 * bends)))[:, None] * (upper + lower))
     safe = np.where(bent, bends, 1.0)
     factors = np.where(bent, 2.0 / safe * np.tan(0.5 * safe), 1.0 + np.where(bends < SMALL, bends * bends / 12.0, 0.0))
     return np.asarray((0.5 * lengths * factors)[:, None] * (upper + lower))

@@ -27,7 +27,7 @@ from groundstation.errors import SurveyError
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import add_shared_errors
 from groundstation.survey.fusion.tangents import tangents_of
-from groundstation.survey.path.leg_wander import STEADY, LegWander
+from groundstation.survey.path.leg_wander import STEADY, UNTIED, CollarTie, LegWander
 from groundstation.survey.well.arcs import on_arc
 from groundstation.survey.well.depth_errors import EXACT, StationDepth
 from groundstation.survey.well.methods import Method
@@ -69,6 +69,7 @@ class Trajectory:
     ) -> None:
         self.method = method
         self._wander = wander
+        self._tie = UNTIED
         self._driven = NOTHING  # (s,), variance by which each leg is driven over that of the curvature; 1 of the others
         self._keeps_columns = keeps_columns
         first = collar or Direction(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
@@ -168,11 +169,11 @@ class Trajectory:
         for before, md in itertools.pairwise(mds):
             if not 0.0 < md - before < math.inf:
                 raise SurveyError(f"trajectory: expected a depth beyond {before:g} m, got {md:g} m")
-        directions = [self._stations.directions[-1], *(direction for _, direction in stations)]
-        check_bends(self.method, mds, tangents_of(directions))
+        tangents = tangents_of([direction for _, direction in stations])
         known = len(self)
+        check_bends(self.method, mds, np.concatenate([self._stations.rows["tangent"][known - 1 : known], tangents]))
         self._stations.append_all(stations, depths)
-        self._stations.direct(range(known, len(self)))
+        self._stations.direct(range(known, len(self)), tangents)
         self._draw(known)
 
     def put(
@@ -213,20 +214,34 @@ class Trajectory:
         if changed:
             self._draw(changed[0])
 
-    def bend_as(self, wander: LegWander, driven: Array) -> None:
+    def bend_as(self, wander: LegWander, driven: Array, tie: CollarTie = UNTIED) -> None:
         """Take another wander of the path, for what is drawn from now on.
 
         Parameters
         ----------
         driven : (s,), of each leg from the collar down the variance by which it is driven over that of the curvature
+        tie : of the direction at the collar with the first leg
         """
-        self._wander, self._driven = wander, driven
+        self._wander, self._driven, self._tie = wander, driven, tie
+
+    @property
+    def tied_covs(self) -> Array:
+        """What ``covs`` (n, 3, 3) have of errors of the collar's direction that the first leg undoes, m^2."""
+        found = np.zeros((len(self), 3, 3))
+        if len(self) > 1:
+            found[1:] = self._tied(float(self.md[1] - self.md[0]), 1.0) * across_of(self._stations.rows["along"][1])
+        return found
+
+    def _tied(self, leg: float, share: float) -> float:
+        """Variance each way across the hole, m^2, at a share of the first leg (m) by what both have in common."""
+        weight = 0.5 * leg * share * (2.0 - share)  # of the direction at the collar in a place
+        return 2.0 * weight * self._tie.moment_covariance(leg, share, self._wander.length)
 
     def _moments(self, begin: int, lengths: Array) -> Array:
         """Moments (n, 4) of the path over legs (n,), m, from the one below a place on."""
         found = self._wander.moments(lengths)
-        driven = self._driven[begin : begin + len(found)]
-        found[: len(driven), [0, 2]] *= driven[:, None]  # of itself, and of it with the curvature at its end
+        if len(driven := self._driven[begin : begin + len(found)]):
+            found[: len(driven), [0, 2]] *= driven[:, None]  # of itself, and of it with the curvature at its end
         return found
 
     @property
@@ -266,6 +281,7 @@ class Trajectory:
         driven = float(self._driven[k]) if k < len(self._driven) else 1.0
         moment = moment._replace(variance=driven * moment.variance)
         cov = cov + self._wander.grown(float(upper["memory"]), moment) * across_of(along)
+        cov = cov + (self.tied_covs[k] if k else self._tied(leg, f) * across_of(along))
         for row, own, weight, moved in zip((upper, lower), (k, k + 1), weights, by_depth, strict=True):
             cov = cov + weight**2 * row["own"] + float(row["depth_var"]) * np.outer(moved, moved)
             shared = add_shared_errors(shared, weight * self._stations.tangent_columns(own))
@@ -297,7 +313,7 @@ class Trajectory:
         rows["position"] = np.add.accumulate(np.concatenate([rows["position"][:1], legs]))
         more = self._go_along(begin, rows, legs)
         followed = self._stations.follow(self._sums, begin, end - 1, with_columns=self._keeps_columns)
-        rows["cov"][1:] = followed.covs + more
+        rows["cov"][1:] = followed.covs + more + self.tied_covs[begin + 1 :]
         self._sums = followed.sums
         self._marks += followed.marks
         if self._keeps_columns:
@@ -311,7 +327,7 @@ class Trajectory:
             follow_legs,  # reading alone needs no compiler
         )
 
-        lengths, more = np.diff(rows["md"]), np.empty((len(legs), 3, 3))
+        lengths, more = rows["md"][1:] - rows["md"][:-1], np.empty((len(legs), 3, 3))
         alongs, memories = rows["along"].copy(), rows["memory"].copy()
         kinks, path = rows["kinks"].copy(), rows["path"].copy()
         follow_legs(

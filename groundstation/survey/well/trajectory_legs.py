@@ -18,11 +18,12 @@ from groundstation.survey.well.arcs import arc_displacements, bend_angles
 from groundstation.survey.well.methods import OPPOSITE, Method, leg_displacement
 
 Array = npt.NDArray[np.float64]
+BACKWARDS = -0.99  # cosine of a bend, short of which none is nearly opposite
 
 
 def leg_displacements(method: Method, mds: Array, tangents: Array) -> Array:
     """Displacements (n, 3) from station to station, of depths (n + 1,) and tangents (n + 1, 3)."""
-    upper, lower, lengths = tangents[:-1], tangents[1:], np.diff(mds)
+    upper, lower, lengths = tangents[:-1], tangents[1:], mds[1:] - mds[:-1]
     if method is Method.MINIMUM_CURVATURE:
         return arc_displacements(lengths, upper, lower)
     if method is Method.BALANCED_TANGENTIAL:
@@ -44,8 +45,9 @@ def check_bends(method: Method, mds: Sequence[float], tangents: Array) -> None:
     SurveyError
         With the depths of the first leg that turns back on itself.
     """
-    if method is not Method.MINIMUM_CURVATURE:
+    upper, lower = tangents[:-1], tangents[1:]
+    if method is not Method.MINIMUM_CURVATURE or (upper * lower).sum(axis=-1).min(initial=1.0) > BACKWARDS:
         return
-    for leg in np.flatnonzero(bend_angles(tangents[:-1], tangents[1:]) > math.pi - OPPOSITE).tolist():
+    for leg in np.flatnonzero(bend_angles(upper, lower) > math.pi - OPPOSITE).tolist():
         above, below = mds[leg], mds[leg + 1]
         raise SurveyError(f"trajectory: the hole turns back on itself between {above:g} and {below:g} m")

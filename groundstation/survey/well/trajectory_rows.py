@@ -73,5 +73,7 @@ def across_of(along: Array) -> Array:
 
 def runs_of(shared: Array, widths: npt.NDArray[np.intp]) -> list[Array]:
     """Parts of columns (n, 3, s) with as many columns as were known of each, those with equally many together."""
+    if widths[0] == widths[-1]:
+        return [shared[:, :, : int(widths[0])]]
     borders = [0, *(np.flatnonzero(np.diff(widths)) + 1).tolist(), len(widths)]
     return [shared[a:b, :, : int(widths[a])] for a, b in itertools.pairwise(borders)]

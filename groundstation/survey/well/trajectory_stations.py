@@ -74,15 +74,23 @@ class TrajectoryStations:
         self._columns += [NONE] * more
         self._down += [NOTHING] * more
 
-    def direct(self, places: Sequence[int]) -> None:
-        """Compute the rows at some places that depend on their own direction alone."""
+    def direct(self, places: Sequence[int], tangents: Array | None = None) -> None:
+        """Compute the rows at some places that depend on their own direction alone.
+
+        Parameters
+        ----------
+        places : all of them, or a range of consecutive ones
+        tangents : (n, 3), where they are known already
+        """
         if not places:
             return
         directions = [*map(self.directions.__getitem__, places)]
-        tangents = tangents_of(directions)
+        if tangents is None:
+            tangents = tangents_of(directions)
         jacobians = tangent_jacobians(tangents)
         counts, own_vars = [], []
-        rows, at = self.rows, np.array(places)
+        rows = self.rows
+        at = slice(places.start, places.stop) if isinstance(places, range) else np.array(places)
         for place, direction, jacobian in zip(places, directions, jacobians, strict=True):
             own, columns, self._down[place] = tangent_errors(direction, jacobian)
             rows["own"][place], self._columns[place], depth = own, columns, self.depths[place]
@@ -90,7 +98,7 @@ class TrajectoryStations:
             counts.append((width, len(columns.places), len(depth.columns.places)))
             own_vars.append(depth.own_var)
         rows["tangent"][at] = tangents
-        rows["width"][at], rows["count"][at], rows["depths"][at] = np.array(counts).T
+        rows["width"][at], rows["count"][at], rows["depths"][at] = zip(*counts, strict=True)
         rows["depth_var"][at] = own_vars
 
     def shared_depth_vars(self) -> Array:
@@ -128,10 +136,12 @@ class TrajectoryStations:
             np.concatenate(self._down[begin : end + 1]),
         )
         depth_starts = np.concatenate([FROM_ZERO, rows["depths"].cumsum()])
-        depth_places = np.concatenate([*map(DEPTH_PLACES, depths)]).astype(np.intp, copy=False)
-        by_depth = np.concatenate([*map(DEPTH_VALUES, depths)], axis=1)[0]
+        depth_places, by_depth = FROM_ZERO[:0], NOTHING
+        if depth_starts[-1]:
+            depth_places = np.concatenate([*map(DEPTH_PLACES, depths)]).astype(np.intp, copy=False)
+            by_depth = np.concatenate([*map(DEPTH_VALUES, depths)], axis=1)[0]
         alongs = rows["along"][1:].copy()
-        legs = np.diff(rows["md"])
+        legs = rows["md"][1:] - rows["md"][:-1]
         ends = 0.5 * legs
         weights = ends.copy()  # of the station before each, which has both its legs now
         weights[0] += 0.5 * sums.length

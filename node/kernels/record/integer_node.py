@@ -29,7 +29,7 @@ from node.kernels.arithmetic.formats import (
     WEIGHT_Q,
     Array,
 )
-from node.kernels.arithmetic.quantity import WARMTH_Q
+from node.kernels.arithmetic.quantity import RATE_VAR_Q, WARMTH_Q
 from node.kernels.record.events import TOLD_Q
 from node.kernels.record.filter_record import CONFIG, STATE
 from node.kernels.record.integer_filter import FIXED_CONFIG, FIXED_STATE
@@ -71,6 +71,11 @@ OWN_FORMATS: Final[dict[str, Any]] = {
     "scale_std": RATE_Q,
     "back": ANGLE_Q,
     "mirror.down": VECTOR_Q,
+    "outside": RATE_Q,
+    "creep.bias": RATE_Q,
+    "creep.bias_var": RATE_VAR_Q,
+    "first": ANGLE_Q,
+    "standing": VAR_Q,
     "felt": VECTOR_Q,
     "turned": VECTOR_Q,
     "jump": ANGLE_Q,

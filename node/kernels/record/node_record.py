@@ -16,8 +16,8 @@ from node.kernels.record.sensor_record import MAX_IMUS, MOUNT, OFFSET, STATIC, S
 
 # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches,
 # 6 no odd forces, 7 no swings, 8 no ramps, 9 no revisions, 10 no parts of cycles,
-# 11 no wrong aidings, 12 no counters that stand and no mirror
-NODE_LAYOUT: Final = 13
+# 11 no wrong aidings, 12 no counters that stand and no mirror, 13 no turns at rest and no errors that return
+NODE_LAYOUT: Final = 14
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
@@ -72,6 +72,8 @@ SWING: Final = np.dtype(
     [
         ("cycles", "i8"),  # whose rates bend, less those that do not
         ("excess", "f8"),  # rad^2, mean of what a bend makes of the yaw
+        ("inside", "i8"),  # aidings whose rate no cycle beside them has, less those of which one does
+        ("outside", "f8"),  # rad/s, mean of by how much
     ],
     align=True,
 )
@@ -101,6 +103,28 @@ MIRROR: Final = np.dtype(
         ("across", "f8"),  # mean of Im(z p), of the force z and the direction p across the axis
         ("felt", "f8"),  # mean of |z|^2
         ("turned", "f8"),  # mean of |p|^2
+    ],
+    align=True,
+)
+CREEP: Final = np.dtype(
+    [
+        ("cycles", "i8"),  # of this rest, over which turns are summed up
+        ("bias", "f8", (3,)),  # rad/s, when the string came to rest
+        ("bias_var", "f8", (3,)),  # (rad/s)^2, of it
+        ("angle", "f8", (3,)),  # rad, by which the string has turned since, if it did
+        ("across", "f8", (2,)),  # gravity across the axis, mean of the first cycles of the rest
+        ("first", "f8"),  # rad, of the turn by the middle of those
+        ("doubted", "i8"),  # 1: in this rest it turned; 2: that was told
+        ("doubt", "f8"),  # rad^2, variance of the yaw by such turns
+        ("standing", "f8"),  # rad^2, of it as the rest began
+    ],
+    align=True,
+)
+SAME: Final = np.dtype(
+    [
+        ("seen", "i8"),  # series of rejected aidings that began with the same error
+        ("angle", "f8"),  # rad, size of it
+        ("left", "i8"),  # aidings used, until it is forgotten
     ],
     align=True,
 )
@@ -135,6 +159,8 @@ GUARD: Final = np.dtype(
         ("swing", SWING),  # of the drive, between cycles
         ("ramp", RAMP),  # of the drive, over cycles
         ("mirror", MIRROR),  # of the sensors' axes
+        ("creep", CREEP),  # of the string below a head at rest
+        ("same", SAME),  # errors of the encoder that return
         ("jump", "f8"),  # rad, by which resets that nothing explains have moved the yaw
         ("last_jump", "f8"),  # rad, of it by the reset since the last aiding that agreed
         ("odd", "i8"),  # cycles in a row whose force at rest is not that of gravity as the filter has it
@@ -372,6 +398,7 @@ def forget_session(nodes: Array) -> None:
     guard["rate"] = guard["sane_rate"] = guard["agreed_rate"] = guard["aiding_var"] = 0.0
     guard["rate_at"] = -np.inf
     guard["swing"] = np.zeros(1, SWING)
+    guard["creep"]["cycles"] = 0
     guard["jumped"] = guard["untimely"] = guard["agreed"] = guard["rest_cycles"] = 0
     nodes["twist"]["heard_at"] = -np.inf
     nodes["twist"]["torque"] = 0.0

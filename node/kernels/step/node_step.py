@@ -70,6 +70,7 @@ from node.kernels.sensors.static_average import follow_recording
 from node.kernels.string.make_up import follow_joints
 from node.kernels.string.relay import offer_aiding
 from node.kernels.string.twist import gate_twist, holds_survey, reaching_var, twist_var
+from node.kernels.turns.creep import follow_creep
 from node.kernels.turns.exchanged_axes import put_axes_right, watch_axes
 from node.kernels.turns.gates import admits_cycle, gate_aiding
 from node.kernels.turns.guard import guard_reading, judge_cycle
@@ -202,6 +203,7 @@ def after_loop(node: Any, settings: Any, moment: Array, status: int, waits: int)
     take_status(node, status, waits)
     follow_swing(node)
     follow_ramp(node)
+    follow_creep(node, settings)
     watch_axes(node, settings)
     put_delay_right(node)
     doubt_step(node, moment[END] - moment[START])

@@ -30,7 +30,9 @@ from node.kernels.turns.aiding_watch import AT_ONCE, AT_REST, STARTING, find_mis
 from node.kernels.turns.mismatches import learn_mismatch, recover_gyro
 from node.kernels.turns.odd_force import keeps_out
 from node.kernels.turns.ramps import follow_fit, is_starting, learn_scale_anew
+from node.kernels.turns.same_errors import follow_same_errors
 from node.kernels.turns.sensor_trust import SANE_CYCLES, hold_safe_state, is_faulty, tell_recovery
+from node.kernels.turns.swings import explains_jump, follow_inside, is_beat
 from node.kernels.turns.yaw_doubts import follow_jump, follow_misfit, keep_contradiction, misfit_var
 
 AGREEING: Final = 4  # aidings in a row, until the node is trusted again
@@ -96,6 +98,9 @@ def judge_cycle(node: Any, status: int, at: float) -> None:
     if has_encoder_changed(node, rejected):
         reset_aiding_watch(guard.aidings)
     find_mismatch(guard.aidings, guard.found, state.innovation, sigma, state.now_rate, at, rejected, reset, patience)
+    follow_inside(node)
+    if guard.found.fault != 0 and is_beat(node, guard.found.rate):
+        guard.found.fault, guard.found.refuted = 0, 1
     if guard.gyro.fault == 0:
         follow_doubts(node, rejected, reset)
     if guard.found.fault != 0:
@@ -137,11 +142,12 @@ def follow_doubts(node: Any, rejected: int, reset: int) -> None:
     """
     guard = node.guard
     follow_fit(node, rejected)
+    follow_same_errors(node, rejected)
     if rejected == 0:
         guard.last_jump = 0
     if rejected == 0 or guard.found.refuted == 1:
         follow_misfit(node)
-    if reset == 1:
+    if reset == 1 and not explains_jump(node):
         follow_jump(node)
         if is_starting(node):
             learn_scale_anew(node)

@@ -45,6 +45,7 @@ from node.kernels.arithmetic.quantity import NONE, ONE, factor_quantity, varianc
 from node.kernels.filter.priors import stamp_var
 from node.kernels.filter.resets import turn_present
 from node.kernels.record.events import Code, event_degrees, event_number, queue_event
+from node.kernels.turns.same_errors import same_error_var
 from node.kernels.turns.swings import swing_var
 
 MEMORY: Final = 32  # aidings over which the misfit is averaged
@@ -83,9 +84,10 @@ def noise_var(node: Any) -> float:
 
 @kernel
 def unexplained_var(node: Any) -> float:
-    """Variance (rad^2) of the yaw that no filter averages away: of misfit, ramps, the jump, of a late window."""
-    dated = passing_var(node) + delay_var(node)
-    return bounded_variance(misfit_var(node) + node.guard.ramp.doubt + angular_square(node.guard.jump) + dated)
+    """Variance (rad^2) of the yaw that no filter averages away: of misfit, string, encoder, of a late window."""
+    guard, dated = node.guard, passing_var(node) + delay_var(node)
+    of_string, of_encoder = guard.ramp.doubt + guard.creep.doubt, angular_square(guard.jump) + same_error_var(node)
+    return bounded_variance(misfit_var(node) + of_string + of_encoder + dated)
 
 
 @kernel

@@ -34,6 +34,10 @@ def _play(run_on_s: object) -> Tables:
     return _rough(string={"backlash_deg": 0.1, "run_on_s": run_on_s})
 
 
+def _leaning(setup: Tables) -> Tables:
+    return {**setup, "path": {"straight": {"inclination_deg": 30.0}}}
+
+
 def _late(off_ms: float) -> Tables:
     return _rough(FINE_HZ, sensor={**MPU, "crystal": Between(-0.02, 0.02), "delay_off_ms": off_ms})
 
@@ -56,6 +60,9 @@ WHIRLING = {"lean_deg": Between(0.05, 0.3), "force_g": Between(0.05, 0.5), "hert
 LOST = (
     "edges missed at the rate of drilling are missed of every turn there: a gyroscope that shows too much does so too"
 )
+SLOW = "a bias that wanders by as much as its Allan floor allows shows the same, and so does gravity at 2 deg of lean"
+WOUND = "a string that winds evenly below a head that turns evenly is a gyroscope whose scale is off"
+UNWINDING = _leaning(_befallen("slow-twist", **LET_GO))
 MILD: tuple[Tables, ...] = (
     {"rough": {"drive": {"ripple": Between(0.05, 0.3), "ripple_s": Between(1.0, 8.0)}}},
     {"rough": {"encoder": {"eccentricity_deg": Between(0.01, 0.05)}}},
@@ -82,8 +89,12 @@ THIRD = (
     DisturbanceCase(
         "exchanged", "axes x and y exchanged", _befallen("axes-exchanged", after_s=TURNING), by_ground=True
     ),
-    DisturbanceCase("creeps", "string creeps at rest, 0.005 to 0.02 deg/s", _befallen("slow-twist", **CREEP)),
-    DisturbanceCase("let-go", "wound up slowly, 0.1 to 1 deg, let go at rest", _befallen("slow-twist", **LET_GO)),
+    DisturbanceCase("creeps", "string creeps at rest, 0.005 to 0.02 deg/s", _befallen("slow-twist", **CREEP), SLOW),
+    DisturbanceCase("creeps-30", "the same at 30 deg of lean", _leaning(_befallen("slow-twist", **CREEP))),
+    DisturbanceCase(
+        "let-go", "wound up slowly, 0.1 to 1 deg, let go at rest", _befallen("slow-twist", **LET_GO), WOUND
+    ),
+    DisturbanceCase("unwinds-slowly", "wound up slowly, let go at rest, at 30 deg of lean", UNWINDING, WOUND),
     DisturbanceCase("run-on", "backlash 0.1 deg, run-on within 0.1 to 3 s", _play(Between(0.1, 3.0))),
     DisturbanceCase("run-on-1", "backlash 0.1 deg, run-on within 1 s", _play(1.0)),
     DisturbanceCase("run-on-3", "backlash 0.1 deg, run-on within 3 s", _play(3.0)),

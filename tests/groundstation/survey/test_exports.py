@@ -2,6 +2,7 @@
 
 import csv
 import dataclasses
+import datetime
 import io
 import json
 import subprocess
@@ -14,10 +15,12 @@ import numpy as np
 import pytest
 from forked_commands import run
 
+from borechain import api
 from groundstation.entry.quoted_cells import quoted_cell
 from groundstation.errors import SurveyError
+from groundstation.report.wall_report import column_records
 from groundstation.survey.exports.export_hole import ExportHole, ExportSite
-from groundstation.survey.exports.export_request import FORMATS, exported_bytes
+from groundstation.survey.exports.export_request import FORMATS, exported_bytes, site_of_wall
 from groundstation.survey.files.field_files import read_any
 
 MD = np.array([0.0, 10.0, 20.0, 30.0])
@@ -215,6 +218,47 @@ def test_places_of_a_map_are_read_back_to_a_micrometre_and_need_a_grid() -> None
         assert feature["properties"]["verdict"] == hole.verdict
     with pytest.raises(SurveyError, match="geojson: expected --grid-crs and --origin"):
         exported_bytes(dataclasses.replace(TWO, crs=""), "geojson")
+    with pytest.raises(SurveyError, match="--grid-crs: expected a grid such as EPSG:25833, got 'EPSG:99999'"):
+        exported_bytes(dataclasses.replace(TWO, crs="EPSG:99999"), "geojson")
+    far = dataclasses.replace(TWO.holes[0], axis=TWO.holes[0].axis * 1e6)
+    with pytest.raises(SurveyError, match=r"K1: easting 3.3.*lie outside the grid"):
+        exported_bytes(dataclasses.replace(TWO, holes=(far,)), "geojson")
+
+
+FOUR = """
+name = "four"
+radius_m = 0.6
+thickness_m = 0.8
+length_m = 8
+heads = "h.csv"
+stations = "s.csv"
+allowed_probability = 0.5
+"""
+
+
+@pytest.mark.parametrize(
+    ("leans_deg", "verdicts"),
+    [
+        ((9, 0, 0, 0), ("not tight", "not tight", "tight", "tight")),  # the first leans away: its joint is open
+        ((0, 0, None, 0), ("tight", "not tight", "not tight")),  # the third is not there: open on both of its sides
+        ((0, 0, 0, 0), ("tight",) * 4),
+    ],
+)
+def test_a_column_of_a_wall_has_the_verdict_of_its_joints(
+    tmp_path: Path, leans_deg: tuple[int | None, ...], verdicts: tuple[str, ...]
+) -> None:
+    names = ("K-1", "K-2", "K-3", "K-4")  # as joints are named, by dashes
+    (tmp_path / "wall.toml").write_text(FOUR)
+    heads = "".join(f"{name},{0.7 * k},0\n" for k, name in enumerate(names))
+    (tmp_path / "h.csv").write_text(f"column,north_m,east_m\n{heads}")
+    holes = [(name, lean) for name, lean in zip(names, leans_deg, strict=True) if lean is not None]
+    rows = "".join(f"{name},{md},{lean},180\n" for name, lean in holes for md in (0, 4, 8))
+    (tmp_path / "s.csv").write_text(f"column,md_m,inclination_deg,azimuth_deg\n{rows}")
+    judged = api.wall(tmp_path / "wall.toml")
+    site = site_of_wall(judged.wall, judged.judgement, datetime.date(2026, 11, 27))
+    assert tuple(hole.verdict for hole in site.holes) == verdicts
+    records = column_records(judged.wall, judged.judgement)
+    assert bool(records[0].actions) == (leans_deg[0] == 9)
 
 
 @pytest.mark.parametrize("form", ["witsml", "las"])

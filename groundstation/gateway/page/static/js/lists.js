@@ -3,6 +3,8 @@
 import { byId, element, fillList, shown, write } from "./dom.js";
 
 const FEWEST_ORDERS = 8;
+const MOST_FINDINGS = 6;
+const VERDICTS = { tight: "tight", not_proven: "NOT PROVEN to be tight", not_tight: "NOT TIGHT so far" };
 const DONE = { sent: "sent …", acknowledged: "under way …", done: "done", failed: "FAILED" };
 const SIGNS = { bad: "▲", degraded: "●", notice: "○" };
 
@@ -31,21 +33,25 @@ export function showString(picture, sinceHeard) {
 }
 
 /**
- * The joints with the neighbours, the worst first.
+ * The joints with the neighbours, the worst first, with the verdict and what speaks against more.
  * @param {WallNeighbourhood | null} [wall]
  */
 export function showWall(wall) {
   byId("wall").hidden = !wall;
   if (!wall) return;
   write(byId("wall-title"), `Wall ${wall.name}, hole ${wall.hole}`);
-  write(byId("wall-problem"), wall.problem ?? `required ${(100 * wall.required_thickness_m).toFixed(0)} cm`);
+  write(byId("wall-problem"), wall.problem ?? `${VERDICTS[wall.verdict]}; required ${(100 * wall.required_thickness_m).toFixed(0)} cm`);
+  const findings = wall.findings.slice(0, MOST_FINDINGS);
+  if (findings.length < wall.findings.length) findings.push(`and ${wall.findings.length - findings.length} more`);
+  fillList(byId("wall-findings"), findings, (text) => text, () => element("li"), write);
   const joints = [...wall.joints].sort((a, b) => (b.probability_where_surveyed ?? 0) - (a.probability_where_surveyed ?? 0));
   fillList(byId("joints"), joints, (joint) => joint.joint, () => element("tr", {}, ...cells(4)), (line, joint) => {
     const thin = joint.thickness_m !== null && joint.thickness_m < wall.required_thickness_m;
     line.className = thin ? "grave" : (joint.probability_where_surveyed ?? 0) > wall.allowed_probability ? "serious" : "";
     const chance = joint.probability_where_surveyed;
     const thickness = joint.thickness_m === null ? null : 100 * joint.thickness_m;
-    const texts = [joint.joint, shown(thickness, 0), shown(joint.thinnest_at_m), chance === null ? "not surveyed" : `${chance.toPrecision(1)}${thin ? " too thin" : ""}`];
+    const part = joint.surveyed_percent < 100 ? `, ${joint.surveyed_percent} % surveyed` : "";
+    const texts = [joint.joint, shown(thickness, 0), shown(joint.thinnest_at_m), chance === null ? "not surveyed" : `${chance.toPrecision(1)}${thin ? " too thin" : ""}${part}`];
     texts.forEach((text, place) => write(line.children[place], text));
   });
 }

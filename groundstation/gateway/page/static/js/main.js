@@ -2,6 +2,7 @@
 
 import { connectChecks, showChecks, showEnd } from "./checks.js";
 import { byId, write } from "./dom.js";
+import { connectExports, offerWall } from "./exports.js";
 import { History } from "./history.js";
 import { showAlarms, showOrders, showString, showTubes, showWall } from "./lists.js";
 import { Picture } from "./picture.js";
@@ -59,7 +60,10 @@ function paint() {
   }
   if (isNew("adjustment")) showChecks(picture.answers.adjustment);
   if (isNew("column")) showEnd(picture.answers.column);
-  if (isNew("wall")) showWall(wall?.wall);
+  if (isNew("wall")) {
+    showWall(wall?.wall);
+    offerWall(Boolean(wall?.wall));
+  }
   if (isNew("alarms")) showAlarms(alarms, orderAboutAlarm);
   if (isNew("orders")) showOrders(orders);
   if (isNew("string")) showTubes(picture);
@@ -103,6 +107,7 @@ byId("tube").addEventListener("change", (event) => { event.target.dataset.chosen
 byId("space").addEventListener("click", turnPlan);
 byId("print").addEventListener("click", () => window.print());
 connectChecks();
+connectExports();
 connectSetup((name, parameters) => order(name, parameters, tell));
 connectTheme(byId("theme"));
 

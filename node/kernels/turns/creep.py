@@ -1,0 +1,224 @@
+"""Does the string turn below a head at rest? The gyroscope against its own past, with gravity as a witness.
+
+A string that runs on into its play, unwinds or creeps turns while the encoder shows a head at rest. A rest is where the
+filter takes whatever its gyroscope shows for the bias, so the turn goes there. Here the rates of a rest are summed up
+beyond the bias of before it,
+
+    A = sum (w - b) T,    var A = t^2 (P_b + sigma_b^2 min(t / t_w, 1) + N^2 / t),
+
+with P_b the variance of the bias b as the string came to rest, what it wanders by after t (the mean over t of a
+Gauss-Markov bias is off by 2 t / 3 tau of its variance, t_w = 3 tau / 2), and the noise N. Where A is beyond that it is
+in doubt whether the string turned: its square is systematic variance of the yaw, until rests without it halve it.
+
+Two witnesses are asked. The *other axes*: a sensor that warms up, or feels another force, moves all its biases, a
+string none of those across. *Gravity*: of a tube that leans by I the tool face, the mean of eight samples against that
+of the first eight, shows a turn to within half of a sample's tilt over sin I, whatever the bias did. Where that is
+finer than the turn claimed since then the two must agree, or the doubt is withdrawn; and where gravity alone shows a
+turn that the gyroscope does not contradict, that is one.
+
+What is less than both noises is seen by neither: `docs/field.md` has the proof.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from node.kernels.arithmetic.formats import ANGLE_Q, DEG, VECTOR_Q
+from node.kernels.arithmetic.jit import kernel, kernel_constant
+from node.kernels.arithmetic.operations import (
+    angular_root,
+    angular_square,
+    as_number,
+    bounded_ratio,
+    bounded_variance,
+    factor_of,
+    half_of,
+    mean_of_total,
+    quantity_ratio,
+    time_of_cycles,
+    times_factor,
+    turned_angle,
+    vector_length,
+)
+from node.kernels.arithmetic.quantity import NONE, angle_quantity, factor_quantity, variance_quantity
+from node.kernels.filter.modes import HELD, STATIC_BIAS
+from node.kernels.filter.priors import bias_var, noise_over
+from node.kernels.record.events import Code, event_degrees, event_number, queue_event
+from node.kernels.record.filter_record import RING, Err
+
+QUICK: Final = 8  # cycles of a rest, in which a string runs on, and of a mean of gravity
+LONGEST: Final = 600  # cycles of a rest, over which turns are summed up
+WANDERS: Final = 46  # cycles after which a bias may be off by all that it wanders, 3/2 of its time constant
+LIKELY: Final = 5  # half sigmas of a turn that a string is known to make, right after a stop
+UNLIKELY: Final = 6  # half sigmas of any other, which is looked for as long as the rest lasts
+BEYOND: Final = 3  # sigmas, of what is not noise
+SURE: Final = 4  # sigmas, of a turn that gravity alone shows
+LEAST_LEAN: Final = factor_quantity(0.5 * DEG)  # sine of the lean, from where there is a tool face
+LEAST_SQUARE: Final = factor_quantity((0.5 * DEG) ** 2)
+UNSEEN: Final = factor_quantity(1.9)  # rad, standard deviation of a tool face that is none
+LEAST_DOUBT: Final = variance_quantity((0.002 * DEG) ** 2)  # rad^2, below which a doubt counts as zero
+RADIAN: Final = angle_quantity(1.0)
+BX = kernel_constant(Err.BIAS_X)
+AIDING_DOUBTED = kernel_constant(Code.AIDING_DOUBTED)
+
+
+@kernel
+def follow_creep(node: Any, settings: Any) -> None:
+    """Take the cycle in that the filter has just had; see the module."""
+    state, creep = node.filter, node.guard.creep
+    if not is_resting(node):
+        end_rest(creep)
+        remember_biases(state, creep)
+        return
+    newest = (state.cycles - 1) % RING
+    period = state.ring_end[newest] - state.ring_start[newest]
+    creep.cycles = min(creep.cycles + 1, LONGEST)
+    for k in range(3):
+        creep.angle[k] += turned_angle(state.ring_rate[newest, k] - creep.bias[k], period)
+    if creep.cycles == QUICK // 2:
+        creep.first = creep.angle[2]
+    if creep.cycles == QUICK:
+        for k in range(2):
+            creep.across[k] = bounded_ratio(mean_force(state, k), node.config.gravity)
+    if has_sensor_moved(node):
+        withdraw_doubt(node)
+    elif 1 < creep.cycles < LONGEST:
+        judge_turn(node, settings)
+
+
+@kernel
+def is_resting(node: Any) -> bool:
+    """Whether the encoder reports a head at rest to a string that hangs on it, whose bias is known."""
+    state, guard = node.filter, node.guard
+    is_held = state.mode in (STATIC_BIAS, HELD)
+    return bool(guard.rest_cycles > 0 and state.cycles > 0 and not is_held and guard.gyro.fault == 0)
+
+
+@kernel
+def remember_biases(state: Any, creep: Any) -> None:
+    """Keep each bias and its variance, as the filter has them before a rest."""
+    for k in range(3):
+        creep.bias[k] = state.static_bias[k] + state.bias[k]
+        creep.bias_var[k] = state.P[BX + k, BX + k]
+        creep.angle[k] = 0
+
+
+@kernel
+def end_rest(creep: Any) -> None:
+    """A rest that was looked at is over: one without a turn halves what is in doubt."""
+    if creep.cycles > 2 * QUICK and creep.doubted == 0:
+        creep.doubt = half_of(creep.doubt) if creep.doubt > LEAST_DOUBT else 0
+    creep.cycles, creep.doubted = 0, 0
+    creep.standing = creep.doubt
+
+
+@kernel
+def mean_force(state: Any, k: int) -> float:
+    """Mean (m/s^2) of the last ``QUICK`` forces along axis ``k``."""
+    total: float = 0
+    for n in range(QUICK):
+        total += state.ring_force[(state.cycles - 1 - n) % RING, k]
+    return mean_of_total(total, QUICK)
+
+
+@kernel
+def turn_std(node: Any, k: int) -> float:
+    """Standard deviation (rad) of the angle summed up about axis ``k``, of a string that did not turn."""
+    config, creep = node.config, node.guard.creep
+    time = time_of_cycles(node.filter.now, creep.cycles)
+    wander = mean_of_total(bias_var(config, k), WANDERS) * min(creep.cycles, WANDERS)
+    var = bounded_variance(creep.bias_var[k] + wander + noise_over(config, k, 1, time))
+    return turned_angle(angular_root(var), time)
+
+
+@kernel
+def has_sensor_moved(node: Any) -> bool:
+    """Whether the gyroscope shows a turn across the axis too, which a string does not make: its biases have moved."""
+    creep = node.guard.creep
+    moved = 0
+    for k in range(2):
+        moved += 1 if abs(creep.angle[k]) > BEYOND * turn_std(node, k) else 0
+    return moved > 0
+
+
+@kernel
+def judge_turn(node: Any, settings: Any) -> None:
+    """Doubt the yaw by a turn that the gyroscope shows and gravity does not deny, or gravity by itself."""
+    creep = node.guard.creep
+    angle, std = abs(creep.angle[2]), turn_std(node, 2)
+    limit = LIKELY if creep.cycles <= QUICK else UNLIKELY
+    is_shown = 2 * angle > limit * std
+    if creep.cycles >= 2 * QUICK:
+        own, own_std = factor_of(turn_between(node), ANGLE_Q), factor_of(std, ANGLE_Q)
+        felt, felt_std = tool_face_turn(node), tool_face_std(node, settings)
+        both = times_factor(own_std, own_std) + times_factor(felt_std, felt_std)
+        agree = times_factor(own - felt, own - felt) < BEYOND * BEYOND * both
+        if BEYOND * felt_std < abs(own) and not agree:
+            withdraw_doubt(node)
+            return
+        if not is_shown and agree and abs(felt) > SURE * felt_std:
+            is_shown, angle = True, times_factor(RADIAN, abs(felt))
+    if is_shown:
+        doubt_turn(node, angle)
+    if creep.doubted == 1 and creep.cycles >= 2 * QUICK:
+        creep.doubted = 2
+        sigmas = event_number(quantity_ratio(angle, std), VECTOR_Q)
+        queue_event(node, AIDING_DOUBTED, sigmas, event_degrees(angle, ANGLE_Q), NONE, NONE)
+
+
+@kernel
+def turn_between(node: Any) -> float:
+    """Turn (rad) that the gyroscope shows from the middle of gravity's first mean to the middle of its last."""
+    state, creep = node.filter, node.guard.creep
+    since: float = 0
+    for n in range(QUICK // 2):
+        slot = (state.cycles - 1 - n) % RING
+        since += turned_angle(state.ring_rate[slot, 2] - creep.bias[2], state.ring_end[slot] - state.ring_start[slot])
+    return as_number(creep.angle[2] - creep.first - since)
+
+
+@kernel
+def tool_face_turn(node: Any) -> float:
+    """Turn of the tube (rad, as a factor) by its tool face since the rest began; 0 where it does not lean."""
+    state, creep, gravity = node.filter, node.guard.creep, node.config.gravity
+    u, v = bounded_ratio(mean_force(state, 0), gravity), bounded_ratio(mean_force(state, 1), gravity)
+    square = times_factor(creep.across[0], creep.across[0]) + times_factor(creep.across[1], creep.across[1])
+    if square < LEAST_SQUARE:
+        return 0 * square
+    return bounded_ratio(times_factor(u, creep.across[1]) - times_factor(v, creep.across[0]), square)
+
+
+@kernel
+def tool_face_std(node: Any, settings: Any) -> float:
+    """Standard deviation (rad, as a factor) of that turn: of two means of eight samples, sqrt(2 / 8) of one."""
+    state = node.filter
+    across = vector_length(mean_force(state, 0), mean_force(state, 1), 0 * state.ring_force[0, 0])
+    lean = bounded_ratio(across, node.config.gravity)
+    if lean < LEAST_LEAN:
+        return UNSEEN + 0 * lean
+    return bounded_ratio(half_of(factor_of(settings.tilt_noise, ANGLE_Q)), lean)
+
+
+@kernel
+def doubt_turn(node: Any, angle: float) -> None:
+    """The yaw is in doubt by an ``angle`` (rad)."""
+    creep, doubt = node.guard.creep, bounded_variance(angular_square(angle))
+    creep.doubted = max(creep.doubted, 1)
+    if doubt > creep.doubt:
+        take_doubt(node, doubt)
+
+
+@kernel
+def withdraw_doubt(node: Any) -> None:
+    """What looked like a turn in this rest was none: what is in doubt is what was when it began."""
+    creep = node.guard.creep
+    creep.doubted = 0
+    take_doubt(node, creep.standing)
+
+
+@kernel
+def take_doubt(node: Any, doubt: float) -> None:
+    """Have a variance (rad^2) in doubt, in what is said of the present too."""
+    state, creep = node.filter, node.guard.creep
+    state.systematic_var = bounded_variance(max(state.systematic_var + doubt - creep.doubt, 0))
+    creep.doubt = doubt

@@ -1,0 +1,159 @@
+"""A string that turns below a head at rest: what the gyroscope shows of it, and what the other axes and gravity say."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.filter.modes import HELD, STILL
+from node.kernels.record.events import Code
+from node.kernels.record.filter_record import RING, default_config
+from node.kernels.record.node_record import SETTINGS, new_node
+from node.kernels.turns.creep import follow_creep
+
+Array = npt.NDArray[np.float64]
+G = 9.81  # m/s^2
+TILT = 0.02 * DEG  # rad, of one sample
+BIAS_STD, BIAS_TAU, NOISE = 4.941e-3 * DEG, 15.87, 7.313e-3 * DEG  # of the z gyroscope, thesis Table V.1
+KNOWN = 3e-3 * DEG  # rad/s, of the bias as the string comes to rest
+CYCLES = 76  # of a rest of 40 s
+
+
+class Resting:
+    """A node below a head at rest, told nothing but what its sensors read."""
+
+    def __init__(self, lean_deg: float = 2.0) -> None:
+        self.nodes = new_node(default_config())
+        self.node: Any = self.nodes[0]
+        self.settings = np.zeros(1, SETTINGS)
+        self.settings["tilt_noise"] = TILT
+        self.lean, self.cycles, self.turned = math.radians(lean_deg), 0, 0.0
+        self.state, self.creep = self.node["filter"], self.node["guard"]["creep"]
+        self.state["mode"] = STILL
+        for k in range(3):
+            self.state["P"][3 + k, 3 + k] = KNOWN**2
+        self.cycle(np.zeros(3), 0.0, resting=False)
+
+    def cycle(self, rate: Array, turn: float, resting: bool = True, noise: float = 0.0) -> None:
+        """One cycle at mean rates (3, rad/s) in which the tube turns by an angle (rad)."""
+        k, state, guard = self.cycles, self.state, self.node["guard"]
+        self.turned += 0.5 * turn
+        across = G * math.sin(self.lean)
+        state["ring_rate"][k % RING] = rate
+        state["ring_force"][k % RING] = (
+            -across * math.cos(self.turned) + noise,
+            across * math.sin(self.turned),
+            -G * math.cos(self.lean),
+        )
+        self.turned += 0.5 * turn
+        state["ring_start"][k % RING], state["ring_end"][k % RING] = k * PERIOD, (k + 1) * PERIOD
+        self.cycles = k + 1
+        state["cycles"], state["now"] = k + 1, (k + 1) * PERIOD
+        guard["rest_cycles"] = guard["rest_cycles"] + 1 if resting else 0
+        follow_creep(self.node, self.settings[0])
+
+    def rest(self, shown_dps: Array, turned_dps: float | None = None) -> Resting:
+        """A rest at rates (n,) about z, of which the tube turns by ``turned_dps``, by default all of it."""
+        for one in shown_dps.tolist():
+            true = one if turned_dps is None else turned_dps
+            self.cycle(np.array([0.0, 0.0, one * DEG]), true * DEG * PERIOD)
+        return self
+
+    @property
+    def doubt_deg(self) -> float:
+        """Standard deviation of the yaw that is in doubt."""
+        return math.degrees(math.sqrt(self.creep["doubt"]))
+
+    @property
+    def codes(self) -> list[int]:
+        """Codes of the events put in."""
+        return self.node["events"]["ring"]["code"][: self.node["events"]["told"]].tolist()
+
+
+def run_on(angle_deg: float, within_s: float) -> Array:
+    """Mean rates (deg/s) of a string that runs on by an angle, along a smooth step."""
+    at = np.clip(np.arange(CYCLES + 1) * PERIOD / within_s, 0.0, 1.0)
+    return np.diff(angle_deg * at**2 * (3.0 - 2.0 * at)) / PERIOD
+
+
+@pytest.mark.parametrize("within_s", [1.0, 2.0, 3.0])
+def test_a_string_that_runs_on_is_in_doubt_by_what_it_ran(within_s: float) -> None:
+    resting = Resting().rest(run_on(0.1, within_s)[:9])
+    assert resting.doubt_deg == pytest.approx(0.1, rel=0.05)
+    assert resting.state["systematic_var"] == pytest.approx(resting.creep["doubt"])
+
+
+def test_a_string_that_creeps_is_in_doubt_by_what_it_crept() -> None:
+    resting = Resting().rest(np.full(CYCLES, 0.04))
+    assert resting.doubt_deg == pytest.approx(0.04 * CYCLES * PERIOD, rel=0.01)
+    assert resting.codes == [Code.AIDING_DOUBTED], "once in a rest"
+
+
+def test_a_rest_without_a_turn_halves_what_is_in_doubt() -> None:
+    resting = Resting().rest(run_on(0.1, 2.0))
+    for _ in range(2):
+        resting.cycle(np.zeros(3), 0.0, resting=False)
+        assert resting.doubt_deg == pytest.approx(0.1, rel=0.05), "of the rest in which it was seen"
+    resting.rest(np.zeros(40))
+    resting.cycle(np.zeros(3), 0.0, resting=False)
+    assert resting.doubt_deg == pytest.approx(0.1 / math.sqrt(2.0), rel=0.05)
+
+
+def test_a_sensor_that_warms_up_is_no_string_that_turns() -> None:
+    resting = Resting()
+    for k in range(CYCLES):
+        resting.cycle(np.full(3, 0.002 * k * DEG), 0.0)
+    assert resting.creep["doubt"] == 0.0
+
+
+@pytest.mark.parametrize("lean_deg", [15.0, 30.0, 60.0])
+def test_gravity_denies_a_turn_that_is_a_bias(lean_deg: float) -> None:
+    resting = Resting(lean_deg).rest(np.full(CYCLES, 0.05), turned_dps=0.0)
+    assert resting.creep["doubt"] == 0.0
+    assert resting.state["systematic_var"] == 0.0
+    assert not resting.codes
+
+
+def test_gravity_cannot_deny_it_where_it_has_no_tool_face() -> None:
+    resting = Resting(0.2).rest(np.full(CYCLES, 0.05), turned_dps=0.0)
+    assert resting.doubt_deg == pytest.approx(0.05 * CYCLES * PERIOD, rel=0.01)
+
+
+@pytest.mark.parametrize("lean_deg", [30.0, 60.0])
+def test_gravity_shows_a_turn_that_is_too_slow_for_the_gyroscope(lean_deg: float) -> None:
+    slow = np.full(CYCLES, 0.008)
+    assert Resting(2.0).rest(slow).creep["doubt"] == 0.0
+    resting = Resting(lean_deg).rest(slow)
+    crept = 0.008 * PERIOD * (CYCLES - 8)
+    assert resting.doubt_deg == pytest.approx(crept, rel=0.02)
+
+
+def test_gravity_agrees_with_a_string_that_ran_on_before_it_was_looked_at() -> None:
+    assert Resting(30.0).rest(run_on(0.5, 1.0)).doubt_deg == pytest.approx(0.5, rel=0.02)
+
+
+def test_a_tube_in_the_slips_hangs_on_no_head() -> None:
+    resting = Resting()
+    resting.state["mode"] = HELD
+    assert resting.rest(np.full(CYCLES, 0.05)).creep["doubt"] == 0.0
+
+
+def test_honest_rests_are_hardly_ever_in_doubt() -> None:
+    """A bias that wanders as the Allan curve says, and the noise of the rates."""
+    random, doubted, rests = np.random.default_rng(5), 0, 400
+    decay = math.exp(-PERIOD / BIAS_TAU)
+    for _ in range(rests):
+        steps = random.standard_normal((CYCLES, 3)) * BIAS_STD * math.sqrt(1.0 - decay * decay)
+        bias = random.standard_normal(3) * KNOWN
+        resting = Resting()
+        for k in range(CYCLES):
+            bias = decay * bias + steps[k]
+            white = random.standard_normal(3) * NOISE / math.sqrt(PERIOD)
+            resting.cycle(bias + white, 0.0, noise=float(random.standard_normal()) * TILT * G)
+        doubted += resting.creep["doubt"] > 0.0
+    assert doubted <= 0.03 * rests
