@@ -4,6 +4,7 @@ import struct
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from chip_tools import compile_replay, layout_of_one, needs_gcc, run_program, said_numbers
 from click.testing import CliRunner
@@ -15,8 +16,9 @@ from node.errors import NodeConfigurationError
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.node_image import HEAD, IMAGE, LOADER, provision_node
 from node.firmware.tube_settings import MakeUpAngle, TubeSettings
+from node.kernels.record.integer_node import FIXED_PARAMETERS
 from node.translation.firmware_build import FirmwareRequest, build_firmware
-from telemetry.parameters import SensorParameters
+from telemetry.parameters import ParameterBlock, SensorParameters
 
 ONE = TubeSettings(
     3, MakeUpAngle(0.2, 1e-3), MakeUpAngle(-1.1, 2e-3), 1e-3, stiffness=3e4, torsion="variance", joints="both"
@@ -91,6 +93,17 @@ def test_an_image_is_what_the_first_cycle_of_a_node_finds(settings: TubeSettings
     for kind, body in recorded.items():
         assert image[kind][: len(body)] == body, kind
         assert not any(image[kind][len(body) :])
+
+
+@pytest.mark.slow
+def test_the_block_in_use_is_in_the_image(tmp_path: Path) -> None:
+    """Its bias in rad/s counts 2^-46, in the first of the corrections."""
+    block = ParameterBlock(3, 7, SensorParameters(bias=(1e-3, -2e-3, 3e-3)))
+    provision_node(ONE, 8, tmp_path, block)
+    image = parts_of((tmp_path / IMAGE).read_bytes())[PARAMETERS]
+    used, own = np.frombuffer(image, FIXED_PARAMETERS)[:2]
+    assert used["gyroscope"]["bias"][0].tolist() == [round(bias * 2.0**46) for bias in (1e-3, -2e-3, 3e-3)]
+    assert not own["gyroscope"]["bias"].any()
 
 
 @needs_gcc
