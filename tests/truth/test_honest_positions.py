@@ -71,7 +71,7 @@ def test_holes_that_hardly_bend_are_known_better_for_it() -> None:
     """As wellbore 1, and as the calmest, of which more are inside than is said."""
     squares = squares_of(replace(VERTICAL, curvature=0.14, freedom=math.inf)).mean() / 2.0
     assert LEAST - 0.1 < squares < MOST
-    assert squares_of(replace(VERTICAL, curvature=0.03, freedom=math.inf)).mean() / 2.0 > 0.5
+    assert squares_of(replace(VERTICAL, curvature=0.03, freedom=math.inf)).mean() / 2.0 > 0.4
 
 
 def test_north_is_in_every_position() -> None:
