@@ -236,12 +236,13 @@ def test_what_a_covariance_is_made_of_adds_up_to_it_at_every_station(tmp_path: P
     assert (undone > 0.03 * across).all()
     by_source = {name: variances[1:, :2] for name, variances in model.hole.variances.items()}
     assert all((variances >= 0.0).all() for variances in by_source.values())
-    np.testing.assert_allclose(sum(by_source.values()), across, rtol=1e-6)
+    np.testing.assert_allclose(np.sum([*by_source.values()], axis=0), across, rtol=1e-6)
     assert (by_source["random"] < 0.5 * across).all()
-    at_toe = sum(one.variances for one in budget_of_toe(model, examined))
+    budget = budget_of_toe(model, examined)
+    at_toe = np.sum([one.variances for one in budget], axis=0)
     np.testing.assert_allclose(at_toe[:2], across[-1], rtol=0.02)
     legs = np.diagonal(drawn.path_covs[-1])[:2]
-    of_path = sum(one.variances[:2] for one in budget_of_toe(model, examined) if one.source in ("path", "legs"))
+    of_path = np.sum([one.variances[:2] for one in budget if one.source in ("path", "legs")], axis=0)
     assert (of_path > legs - undone[-1]).all()
     items = {row["item"]: row["toe_cm"] for row in shown_on(model, "setup")["items"]}
     assert items["path"] == pytest.approx(100.0 * math.sqrt(of_path.max()), rel=1e-3)
