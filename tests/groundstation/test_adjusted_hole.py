@@ -215,18 +215,20 @@ def test_many_looks_of_few_or_more_stops_are_adjusted_the_same_in_any_order(tmp_
 def test_north_is_in_every_position_as_it_turns_the_hole_about_the_vertical(tmp_path: Path) -> None:
     """A hole to the north is moved to the east by the angle times how far north it is, and neither north nor down."""
     measurements = passes(5, lambda _stop, _station: 5.0)
-    model = knowing(tmp_path, measurements, 5, north_std_deg=1.0)
+    collar = {"collar_inclination_deg": 5.0, "collar_azimuth_deg": 0.0}  # sums along legs are exact without a kink
+    model = knowing(tmp_path, measurements, 5, north_std_deg=1.0, **collar)
     by_north, drawn = model.hole.variances["north"], model.hole.trajectory
     np.testing.assert_allclose(np.sqrt(by_north[:, 1]), math.radians(1.0) * drawn.positions[:, 0], rtol=1e-9)
     assert float(np.max(by_north[:, [0, 2]])) < 1e-20
-    exact = knowing(tmp_path / "exact", measurements, 5)
+    exact = knowing(tmp_path / "exact", measurements, 5, **collar)
     more = drawn.covs[:, 1, 1] - exact.hole.trajectory.covs[:, 1, 1]
     np.testing.assert_allclose(more[1:], by_north[1:, 1], rtol=1e-3)
 
 
 def test_what_a_covariance_is_made_of_adds_up_to_it_at_every_station(tmp_path: Path) -> None:
     """With what the collar's direction and the first leg undo of each other: it is a part of the path's."""
-    model = knowing(tmp_path, passes(6, lambda _stop, station: 1.0 + 0.3 * station), 6, **ALIGNED, play_std_deg=1e-4)
+    known = ALIGNED | {"play_std_deg": 1e-4, "collar_inclination_deg": 1.0, "collar_std_deg": 0.5}
+    model = knowing(tmp_path, passes(6, lambda _stop, station: 1.0 + 0.3 * station), 6, **known)
     drawn, examined = model.hole.trajectory, model.hole.examined
     assert examined is not None
     across = np.diagonal(drawn.covs, axis1=1, axis2=2)[1:, :2]
@@ -234,12 +236,13 @@ def test_what_a_covariance_is_made_of_adds_up_to_it_at_every_station(tmp_path: P
     assert (undone > 0.03 * across).all()
     by_source = {name: variances[1:, :2] for name, variances in model.hole.variances.items()}
     assert all((variances >= 0.0).all() for variances in by_source.values())
-    np.testing.assert_allclose(sum(by_source.values()), across, rtol=1e-6)
+    np.testing.assert_allclose(np.sum([*by_source.values()], axis=0), across, rtol=1e-6)
     assert (by_source["random"] < 0.5 * across).all()
-    at_toe = sum(one.variances for one in budget_of_toe(model, examined))
+    budget = budget_of_toe(model, examined)
+    at_toe = np.sum([one.variances for one in budget], axis=0)
     np.testing.assert_allclose(at_toe[:2], across[-1], rtol=0.02)
     legs = np.diagonal(drawn.path_covs[-1])[:2]
-    of_path = sum(one.variances[:2] for one in budget_of_toe(model, examined) if one.source in ("path", "legs"))
+    of_path = np.sum([one.variances[:2] for one in budget if one.source in ("path", "legs")], axis=0)
     assert (of_path > legs - undone[-1]).all()
     items = {row["item"]: row["toe_cm"] for row in shown_on(model, "setup")["items"]}
     assert items["path"] == pytest.approx(100.0 * math.sqrt(of_path.max()), rel=1e-3)

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow
 Array = npt.NDArray[np.float64]
 WORLDS = 300
 STATED_DEG = 0.3  # deg/m, root of the mean of the variances of the curvatures of all holes
-FREEDOM = 2.0 + 1.0 / 3.0  # of the variance of one of them, as decision 84 says of holes
+FREEDOM = 3.0  # of the variance of one of them, as decision 84 says of holes
 LEAST, MOST = 0.8, 1.2  # mean square over its degrees of freedom, of which three hundred holes leave 0.94 to 1.06
 
 
@@ -71,7 +71,7 @@ def test_holes_that_hardly_bend_are_known_better_for_it() -> None:
     """As wellbore 1, and as the calmest, of which more are inside than is said."""
     squares = squares_of(replace(VERTICAL, curvature=0.14, freedom=math.inf)).mean() / 2.0
     assert LEAST - 0.1 < squares < MOST
-    assert squares_of(replace(VERTICAL, curvature=0.03, freedom=math.inf)).mean() / 2.0 > 0.5
+    assert squares_of(replace(VERTICAL, curvature=0.03, freedom=math.inf)).mean() / 2.0 > 0.4
 
 
 def test_north_is_in_every_position() -> None:
