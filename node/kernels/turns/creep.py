@@ -192,7 +192,7 @@ def judge_turn(node: Any, settings: Any) -> None:
             withdraw_doubt(node)
             return
         if not is_shown and agree and abs(felt) > SURE * felt_std:
-            is_shown, is_sure, angle = True, True, times_factor(RADIAN, abs(felt))
+            is_shown, angle = True, times_factor(RADIAN, abs(felt))
     if is_shown:
         doubt_turn(node, angle)
     if creep.doubted == 1 and is_sure and creep.cycles >= 2 * QUICK:
