@@ -63,6 +63,7 @@ WANDERS: Final = 64  # cycles, in units of which h is the time: 2.1 time constan
 WANDERED: Final = 24  # cycles, after which it grows no more
 LIKELY: Final = 6  # half sigmas of a turn that a string is known to make, right after a stop
 UNLIKELY: Final = 7  # half sigmas of any other, which is looked for as long as the rest lasts
+TOLD: Final = 10  # half sigmas of one that is told, which chance does not make
 BEYOND: Final = 3  # sigmas, of what is not noise
 SURE: Final = 4  # sigmas, of a turn that gravity alone shows
 LEAST_LEAN: Final = factor_quantity(0.5 * DEG)  # sine of the lean, from where there is a tool face
@@ -181,7 +182,7 @@ def judge_turn(node: Any, settings: Any) -> None:
     creep = node.guard.creep
     angle, std = abs(creep.angle[2]), turn_std(node, 2)
     limit = LIKELY if creep.cycles <= QUICK else UNLIKELY
-    is_shown = 2 * angle > limit * std
+    is_shown, is_sure = 2 * angle > limit * std, 2 * angle > TOLD * std
     if creep.cycles >= 2 * QUICK:
         own, own_std = factor_of(turn_between(node), ANGLE_Q), factor_of(std, ANGLE_Q)
         felt, felt_std = tool_face_turn(node), tool_face_std(node, settings)
@@ -194,7 +195,7 @@ def judge_turn(node: Any, settings: Any) -> None:
             is_shown, angle = True, times_factor(RADIAN, abs(felt))
     if is_shown:
         doubt_turn(node, angle)
-    if creep.doubted == 1 and creep.cycles >= 2 * QUICK:
+    if creep.doubted == 1 and is_sure and creep.cycles >= 2 * QUICK:
         creep.doubted = 2
         sigmas = event_number(quantity_ratio(angle, std), VECTOR_Q)
         queue_event(node, STRING_TURNED, sigmas, event_degrees(angle, ANGLE_Q), NONE, NONE)
