@@ -23,7 +23,7 @@ def paper_options() -> tuple[Option, ...]:
     return (
         click.option("--document", default="", help="Number of the document, for --report."),
         click.option("--revision", default="", help="Revision of the document."),
-        click.option("--contractor", default="", help="Who surveyed, for --report."),
+        click.option("--contractor", default="", help="Company that surveyed, for --report."),
         click.option("--language", type=click.Choice(LANGUAGES), default="en", show_default=True, help="Of --report."),
         click.option("--logo", type=click.Path(path_type=Path, dir_okay=False), help="An .svg file, for --report."),
     )
