@@ -277,9 +277,14 @@ class TestSteps:
         for number in range(10_000):
             assembler.add(Due.UPPER_FRAME, b"foreign %d" % number)
         assembler.add(Due.UPPER_FRAME, b"own")
+        assembler.add(Due.UPPER_FRAME, b"behind")
         assembler.add(STEP, pack_step(1, [DueEvent(Due.UPPER_FRAME, 1.0, None, mark_frame(b"own"))]))
         assert assembler.take_step() is not None
-        assert assembler.foreign == 10_000
+        assert assembler.foreign == 10_001
+        assembler.add(Due.UPPER_FRAME, b"own")
+        assembler.add(STEP, pack_step(2, [DueEvent(Due.UPPER_FRAME, 1.0, None, mark_frame(b"own"))]))
+        assert assembler.take_step() is not None
+        assert assembler.foreign == 10_001  # what was behind has gone with its step
 
     def test_a_step_of_another_version_is_one_line(self) -> None:
         with pytest.raises(MediumError, match="step 3: 99 is not a valid Due; is it of another version"):
