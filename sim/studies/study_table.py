@@ -343,7 +343,7 @@ STUDIES = by_name(
             ),
             (Option("holes", 1000, 7, 1_000_000, help="Of all kinds together."), SEED),
             counts="parts",
-            full=("--holes 2000 --seed 20261127",),
+            full=("--holes 1000",),
             short="--holes 7",
         ),
         Study(

@@ -23,7 +23,7 @@ COVARIANCES = 5e-3  # of the largest and the smallest axis
 PLAY = 0.05  # of its variance
 CURVATURE = 0.25  # likewise; that of a leg is left where it moves by a fifth
 KNOWN_AS = 4.0  # looks that the play before them counts for
-HOLE_KNOWN_AS, LEG_KNOWN_AS = 1.0, 4.0  # directions that the curvature before them counts for
+HOLE_KNOWN_AS, LEG_KNOWN_AS = 6.0, 4.0  # directions that the curvature before them counts for
 LIKELY = 16.0  # square beyond which a look counts less
 
 

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow
 Array = npt.NDArray[np.float64]
 WORLDS = 300
 STATED_DEG = 0.3  # deg/m, root of the mean of the variances of the curvatures of all holes
-FREEDOM = 3.0  # of the variance of one of them, as decision 84 says of holes
+FREEDOM = 8.0  # of the variance of one of them, as what is known of six directions is the mean of
 LEAST, MOST = 0.8, 1.2  # mean square over its degrees of freedom, of which three hundred holes leave 0.94 to 1.06
 
 
@@ -67,11 +67,11 @@ def test_positions_are_as_well_known_as_is_said(curvature: float) -> None:
     check_squares(squares_of(replace(VERTICAL, curvature=curvature)))
 
 
-def test_holes_that_hardly_bend_are_known_better_for_it() -> None:
-    """As wellbore 1, and as the calmest, of which more are inside than is said."""
+def test_holes_that_hardly_bend_are_stated_too_widely_and_never_too_narrowly() -> None:
+    """As wellbore 1, and as the calmest: six directions hold a hole to the curvature that is usual, see decision 84."""
     squares = squares_of(replace(VERTICAL, curvature=0.14, freedom=math.inf)).mean() / 2.0
-    assert LEAST - 0.1 < squares < MOST
-    assert squares_of(replace(VERTICAL, curvature=0.03, freedom=math.inf)).mean() / 2.0 > 0.4
+    assert 0.6 < squares < 1.0
+    assert squares_of(replace(VERTICAL, curvature=0.03, freedom=math.inf)).mean() / 2.0 > 0.2
 
 
 def test_north_is_in_every_position() -> None:

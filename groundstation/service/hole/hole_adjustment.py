@@ -23,7 +23,7 @@ from groundstation.service.hole.string_prior import Hanging, prior_of_string
 from groundstation.survey.adjustment.blunders import Examination
 from groundstation.survey.adjustment.looks import OF_TUBE, Looks, PathPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
-from groundstation.survey.fusion.packed import Packed, short_places
+from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR, SphereDirection, tangent_errors
@@ -172,8 +172,9 @@ def directions_of(examination: Examination, shared: SharedErrors, north_std: flo
     columns = np.concatenate([np.swapaxes(bases, 1, 2) @ of_looks, turned[:, :, None]], axis=2)
     places = shared.adjusted_places(columns.shape[2])
     width = shared.count
-    places = short_places(places, width)
     found = []
     for tangent, cov, values in zip(tangents, own, columns, strict=True):
-        found.append(SphereDirection(tangent, cov, Packed.of_values(values, places, width)))
+        packed = Packed.of_values(values, places, width)
+        places = packed.places  # all share them
+        found.append(SphereDirection(tangent, cov, packed))
     return found

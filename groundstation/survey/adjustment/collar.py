@@ -46,9 +46,10 @@ def collar_departure(found: Adjusted) -> CollarDeparture:
     if len(now.tangents) < 2:
         return CollarDeparture(np.zeros(2), np.eye(2), 0.0, 0)
     go, rigid = leg_steps(found.path)
-    told = bases[0] @ found.path.collar_cov @ bases[0].T + KNOWN * np.eye(2)
-    by_leg = np.asarray(np.linalg.inv(rigid[0]), np.float64)
-    led_to = led_down(go[0], told, now.curvature_var)
+    at_collar = np.zeros((STATE, STATE))
+    at_collar[:2, :2] = bases[0] @ found.path.collar_cov @ bases[0].T + KNOWN * np.eye(2)
+    at_collar[2:, 2:] = found.path.curvature_std**2 * np.eye(2)
+    led_to, by_leg = go[0] @ at_collar @ go[0].T, np.asarray(np.linalg.inv(rigid[0]), np.float64)
     known = np.asarray(np.linalg.inv(found.cov_at(1)), np.float64)
     ends = np.stack([now.tangents[0], found.path.collar, now.tangents[0], now.tangents[1]])
     to_told, _, to_station = bends_between(ends, bases[:1].repeat(4, axis=0))
@@ -71,20 +72,6 @@ def collar_tie(found: Adjusted) -> CollarTie:
     states, _ = found.cofactor(one, np.zeros((len(found.common_cov), 2)))
     departs = states[1] - leg_steps(found.path)[0][0] @ states[0]
     return CollarTie(*(0.5 * float(np.trace(part)) for part in (states[0, 2:], departs[:2], departs[2:])))
-
-
-def led_down(go: Array, told: Array, curvature_var: float) -> Array:
-    """Covariance (4, 4) to which a collar leads at the first station, by a leg that adds nothing.
-
-    Parameters
-    ----------
-    go : (4, 4), how direction and curvature go on
-    told : (2, 2) rad^2, of the direction at the collar
-    curvature_var : rad^2/m^2, of the curvature there
-    """
-    at_collar = np.zeros((STATE, STATE))
-    at_collar[:2, :2], at_collar[2:, 2:] = told, curvature_var * np.eye(2)
-    return np.asarray(go @ at_collar @ go.T)
 
 
 def untold_collar(path: PathPrior) -> PathPrior:

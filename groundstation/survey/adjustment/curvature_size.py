@@ -3,11 +3,6 @@
 A curvature that wanders is driven by a noise of one size, so that a hole which is steered back in a single leg would
 contradict whatever reads its lowest station. The noise of each leg has therefore a variance of its own about that of
 the hole, which in turn is about what was known before: the tails are those of Student's distribution.
-
-What is configured is the mean of the variance over all holes. Few bend sharply and most do not, so before its looks the
-variance of a hole is inverse chi-square with `HOLE_KNOWN_AS` degrees of freedom beyond the two without which it has no
-mean: of 0.3 deg/m half of all holes stay below 0.2, one in twenty below 0.11, and one in twenty is above 0.5. What is
-learnt is the mean of what the looks leave possible; before any look it is what is configured.
 Source: Foerstner 1979, with a prior at each of the two levels; Lange, Little and Taylor, "Robust Statistical Modeling
 Using the t Distribution", JASA 84 (1989).
 """
@@ -26,7 +21,7 @@ if TYPE_CHECKING:
     from groundstation.survey.adjustment.looks import StartingPoint
 
 Array = npt.NDArray[np.float64]
-HOLE_KNOWN_AS = 1.0  # directions that the size of the hole's curvature before them counts for
+HOLE_KNOWN_AS = 6.0  # directions that the size of the hole's curvature before them counts for
 LEG_KNOWN_AS = 4.0  # likewise of one leg, that of the hole: the degrees of freedom of its tails
 TOGETHER = 4  # rounds
 LEAST = 1e-12  # rad^2/m^2

@@ -27,7 +27,7 @@ class Packed:
     def __init__(self, columns: Array, places: Places | None = None) -> None:
         """``places`` of those that are not zero, where they are known."""
         at = np.flatnonzero(columns.any(axis=0)) if places is None else places
-        self.places: npt.NDArray[Any] = short_places(at, columns.shape[1])
+        self.places: npt.NDArray[Any] = at.astype(np.uint16 if columns.shape[1] <= MOST_OF_16_BITS else np.intp)
         self.values: Array = columns.take(at, axis=1)
         self.width = int(columns.shape[1])
 
@@ -35,7 +35,7 @@ class Packed:
     def of_values(cls, values: Array, places: Places, width: int) -> Packed:
         """Columns of which ``values`` (k, c) stand at ``places`` (c,), of ``width``."""
         made = cls.__new__(cls)
-        made.places = short_places(places, width)
+        made.places = places.astype(np.uint16 if width <= MOST_OF_16_BITS else np.intp, copy=False)
         made.values, made.width = values, width
         return made
 
@@ -52,11 +52,6 @@ class Packed:
     def fill(self, columns: Array) -> None:
         """Put them into zeros (k, s or more)."""
         columns[:, self.places] = self.values
-
-
-def short_places(places: npt.NDArray[Any], width: int) -> npt.NDArray[Any]:
-    """Places (c,) among ``width`` columns, in 16 bits where these will do; what is so already is not copied."""
-    return places.astype(np.uint16 if width <= MOST_OF_16_BITS else np.intp, copy=False)
 
 
 def packed_each(columns: Array) -> list[Packed]:

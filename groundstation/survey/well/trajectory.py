@@ -313,7 +313,9 @@ class Trajectory:
         rows["position"] = np.add.accumulate(np.concatenate([rows["position"][:1], legs]))
         more = self._go_along(begin, rows, legs)
         followed = self._stations.follow(self._sums, begin, end - 1, with_columns=self._keeps_columns)
-        rows["cov"][1:] = followed.covs + more + self.tied_covs[begin + 1 :]
+        rows["cov"][1:] = followed.covs + more
+        if self._tie is not UNTIED:
+            rows["cov"][1:] += self.tied_covs[begin + 1 :]
         self._sums = followed.sums
         self._marks += followed.marks
         if self._keeps_columns:

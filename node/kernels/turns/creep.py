@@ -14,8 +14,7 @@ variance of the yaw, of which the end of every rest leaves half.
 Two witnesses are asked. The *other axes*: a sensor that warms up, or feels another force, moves all its biases, a
 string none of those across. *Gravity*: of a tube that leans by I the tool face, the mean of eight samples against that
 of the first eight, shows a turn to within half of a sample's tilt over sin I, whatever the bias did. Where that is
-finer than the turn claimed since then the two must agree, or the doubt is withdrawn; and where gravity alone shows a
-turn that the gyroscope does not contradict, that is one.
+finer than the turn claimed since then the two must agree, or the doubt is withdrawn.
 
 What is less than both noises is seen by neither: `docs/field.md` has the proof.
 """
@@ -45,7 +44,6 @@ from node.kernels.arithmetic.operations import (
 from node.kernels.arithmetic.quantity import (
     NONE,
     ONE,
-    angle_quantity,
     factor_quantity,
     rate_quantity,
     variance_quantity,
@@ -61,16 +59,12 @@ LONGEST: Final = 600  # cycles of a rest, over which turns are summed up
 DECAY: Final = factor_quantity(math.exp(-PERIOD / 15.87))  # of the part of a bias that wanders, in a cycle
 WANDERS: Final = 64  # cycles, in units of which h is the time: 2.1 time constants
 WANDERED: Final = 24  # cycles, after which it grows no more
-LIKELY: Final = 6  # half sigmas of a turn that a string is known to make, right after a stop
-UNLIKELY: Final = 7  # half sigmas of any other, which is looked for as long as the rest lasts
-TOLD: Final = 10  # half sigmas of one that is told, which chance does not make
+SHOWN: Final = 5  # sigmas of a turn, which chance does not make however many rests there are
 BEYOND: Final = 3  # sigmas, of what is not noise
-SURE: Final = 4  # sigmas, of a turn that gravity alone shows
 LEAST_LEAN: Final = factor_quantity(0.5 * DEG)  # sine of the lean, from where there is a tool face
 LEAST_SQUARE: Final = factor_quantity((0.5 * DEG) ** 2)  # its square
 UNSEEN: Final = factor_quantity(1.9)  # rad, standard deviation of a tool face that tells nothing
 LEAST_DOUBT: Final = variance_quantity((0.002 * DEG) ** 2)  # rad^2, below which a doubt counts as zero
-RADIAN: Final = angle_quantity(1.0)  # the unit
 BX = kernel_constant(Err.BIAS_X)
 STRING_TURNED = kernel_constant(Code.STRING_TURNED)
 
@@ -112,12 +106,13 @@ def take_cycle(node: Any, slot: int) -> None:
 
 @kernel
 def is_resting(node: Any) -> bool:
-    """Whether the encoder reports a head at rest to a string that hangs on it, whose bias is known."""
-    state, guard = node.filter, node.guard
+    """Whether the encoder reports a head at rest to a string that hangs on it without torque, whose bias is known."""
+    state, guard, twist = node.filter, node.guard, node.twist
     is_held = state.mode in (STATIC_BIAS, HELD)
     is_known = guard.creep.bias_var[2] > 0
     is_slow = state.cycles > 1 and abs(state.now_rate) < FASTEST
-    return bool(guard.rest_cycles > 0 and is_known and is_slow and not is_held and guard.gyro.fault == 0)
+    is_free = twist.torque == 0 and twist.holding == 0 and twist.wound == 0
+    return bool(guard.rest_cycles > 0 and is_known and is_slow and is_free and not is_held and guard.gyro.fault == 0)
 
 
 @kernel
@@ -178,27 +173,28 @@ def has_sensor_moved(node: Any) -> bool:
 
 @kernel
 def judge_turn(node: Any, settings: Any) -> None:
-    """Doubt the yaw by a turn that the gyroscope shows and gravity does not deny, or gravity by itself."""
+    """Doubt the yaw by a turn that the gyroscope shows and gravity does not deny."""
     creep = node.guard.creep
     angle, std = abs(creep.angle[2]), turn_std(node, 2)
-    limit = LIKELY if creep.cycles <= QUICK else UNLIKELY
-    is_shown, is_sure = 2 * angle > limit * std, 2 * angle > TOLD * std
-    if creep.cycles >= 2 * QUICK:
-        own, own_std = factor_of(turn_between(node), ANGLE_Q), factor_of(std, ANGLE_Q)
-        felt, felt_std = tool_face_turn(node), tool_face_std(node, settings)
-        both = times_factor(own_std, own_std) + times_factor(felt_std, felt_std)
-        agree = times_factor(own - felt, own - felt) < BEYOND * BEYOND * both
-        if BEYOND * felt_std < abs(own) and not agree:
-            withdraw_doubt(node)
-            return
-        if not is_shown and agree and abs(felt) > SURE * felt_std:
-            is_shown, angle = True, times_factor(RADIAN, abs(felt))
-    if is_shown:
+    if creep.cycles >= 2 * QUICK and is_denied(node, settings, std):
+        withdraw_doubt(node)
+        return
+    if angle > SHOWN * std:
         doubt_turn(node, angle)
-    if creep.doubted == 1 and is_sure and creep.cycles >= 2 * QUICK:
+    if creep.doubted == 1 and creep.cycles >= 2 * QUICK:
         creep.doubted = 2
         sigmas = event_number(quantity_ratio(angle, std), VECTOR_Q)
         queue_event(node, STRING_TURNED, sigmas, event_degrees(angle, ANGLE_Q), NONE, NONE)
+
+
+@kernel
+def is_denied(node: Any, settings: Any, std: float) -> bool:
+    """Whether gravity shows that the tube did not turn as its gyroscope has it, to within ``std`` (rad)."""
+    own, own_std = factor_of(turn_between(node), ANGLE_Q), factor_of(std, ANGLE_Q)
+    felt, felt_std = tool_face_turn(node), tool_face_std(node, settings)
+    both = times_factor(own_std, own_std) + times_factor(felt_std, felt_std)
+    agree = times_factor(own - felt, own - felt) < BEYOND * BEYOND * both
+    return bool(BEYOND * felt_std < abs(own) and not agree)
 
 
 @kernel

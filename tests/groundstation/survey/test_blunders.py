@@ -122,8 +122,7 @@ def test_the_likelihood_is_that_of_dense_matrices(honest: DrawnString) -> None:
         squares += np.trace(step.T @ np.linalg.solve(spread, step))
     play = 4.0 * (np.log(now.play_var) + (0.01 * DEG) ** 2 / now.play_var)
     hole, legs = now.curvature_var, now.leg_vars
-    of_hole = np.log(hole) + (0.15 * DEG) ** 2 / hole  # decision 84
-    bends = 4.0 * np.sum(np.log(legs / hole) + hole / legs - 1.0) + of_hole
+    bends = 4.0 * np.sum(np.log(legs / hole) + hole / legs - 1.0) + 6.0 * (np.log(hole) + (0.15 * DEG) ** 2 / hole)
     assert deviance_of(found) == pytest.approx(squares + sizes[0] - sizes[1] - sizes[2] + play + bends, abs=0.1)
 
 
