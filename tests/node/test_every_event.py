@@ -106,7 +106,7 @@ CASES: dict[Code, Callable[[], Bench]] = {
     Code.BAD_SAMPLE: lambda: known().cycles(2, spoil=lambda w, f: ((math.nan, 0.0, 0.0), f)),
     Code.GYRO_SATURATED: lambda: known().cycles(2, spoil=lambda w, f: ((0.0, 0.0, 500.0 * DEG), f)),
     Code.GYRO_STUCK: lambda: known().cycles(8, spoil=held),
-    Code.GYRO_STEP: lambda: known().cycles(30, FAST).cycles(12, FAST, lambda w, f: ((w[0], w[1], w[2] + 2 * DEG), f)),
+    Code.GYRO_STEP: lambda: known().cycles(30, FAST).cycles(12, FAST, lambda w, f: ((w[0], w[1], w[2] + 0.5 * DEG), f)),
     Code.GYRO_SCALE: lambda: scaled(known()),
     Code.FORCE_SATURATED: lambda: known().cycles(4, spoil=lambda w, f: (w, (80.0, f[1], f[2]))),
     Code.FORCE_STUCK: lambda: known().cycles(8, spoil=lambda w, f: (w, (0.3, 0.0, -9.8))),
@@ -147,7 +147,7 @@ CASES: dict[Code, Callable[[], Bench]] = {
 
 
 def crept(w: Numbers, f: Numbers) -> tuple[Numbers, Numbers]:
-    return (w[0], w[1], w[2] + 0.05 * DEG), f
+    return (w[0], w[1], w[2] + 0.1 * DEG), (0.0, 0.0, f[2])
 
 
 def exchanged(w: Numbers, f: Numbers) -> tuple[Numbers, Numbers]:

@@ -60,6 +60,7 @@ DECAY: Final = factor_quantity(math.exp(-PERIOD / 15.87))  # of the part of a bi
 WANDERS: Final = 64  # cycles, in units of which h is the time: 2.1 time constants
 WANDERED: Final = 24  # cycles, after which it grows no more
 SHOWN: Final = 5  # sigmas of a turn, which chance does not make however many rests there are
+TOLD: Final = 9  # sigmas of one that is told: a scale that was learnt wrongly leaves a bias that is eight of them off
 BEYOND: Final = 3  # sigmas, of what is not noise
 LEAST_LEAN: Final = factor_quantity(0.5 * DEG)  # sine of the lean, from where there is a tool face
 LEAST_SQUARE: Final = factor_quantity((0.5 * DEG) ** 2)  # its square
@@ -181,7 +182,7 @@ def judge_turn(node: Any, settings: Any) -> None:
         return
     if angle > SHOWN * std:
         doubt_turn(node, angle)
-    if creep.doubted == 1 and creep.cycles >= 2 * QUICK:
+    if creep.doubted == 1 and angle > TOLD * std and creep.cycles >= 2 * QUICK:
         creep.doubted = 2
         sigmas = event_number(quantity_ratio(angle, std), VECTOR_Q)
         queue_event(node, STRING_TURNED, sigmas, event_degrees(angle, ANGLE_Q), NONE, NONE)
