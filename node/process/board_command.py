@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import select
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from node.process.board_findings import BoardFinding
 
 NOT_GOOD = 1  # exit status
-HAND = 30.0  # s in which the head is turned by hand
+LOOK_S = 0.1  # from one reading of the count to the next while the head is turned by hand
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,21 +68,23 @@ def imu_findings(text: str) -> list[BoardFinding]:
 
 def encoder_findings(text: str, turn_deg: float | None) -> list[BoardFinding]:
     """Findings of the encoder by its name."""
-    import time
-
     from node.process.board_sensors import check_encoder
     from node.process.drivers.choice import encoder_source
 
-    def wait() -> None:
-        if turn_deg is not None:
-            click.echo(f"turn the head by {turn_deg:g} deg within {HAND:.0f} s", err=True)
-            time.sleep(HAND)
-
     source = encoder_source(text)
     try:
-        return check_encoder(source, turn_deg, wait=wait)
+        if turn_deg is None:
+            return check_encoder(source)
+        click.echo(f"turn the head by {turn_deg:g} deg, then press Enter", err=True)
+        return check_encoder(source, turn_deg, is_turning=is_turning)
     finally:
         source.close()
+
+
+def is_turning() -> bool:
+    """Whether Enter has not been pressed yet, after a short wait for it; the end of the input counts as pressed."""
+    ready, _, _ = select.select([sys.stdin], [], [], LOOK_S)
+    return not ready
 
 
 @click.group()

@@ -113,13 +113,17 @@ def check_encoder(
     source: EncoderSource,
     turn_deg: float | None = None,
     clock: Clock = time.monotonic,
-    wait: Callable[[], None] = lambda: None,
+    is_turning: Callable[[], bool] = lambda: False,
 ) -> list[BoardFinding]:
-    """Findings of an encoder; where the head is turned forward during ``wait``, by ``turn_deg``, its count too."""
+    """Findings of an encoder; where the head is turned forward by ``turn_deg`` while ``is_turning``, its count too.
+
+    It is read meanwhile, or edges of its lines would be lost: the kernel keeps those of a turn, and not of more.
+    """
     try:
         source.start()
         before = source.read(clock()).count
-        wait()
+        while is_turning():
+            source.read(clock())
         after = source.read(clock()).count
     except SensorError as error:
         return [bad_finding("encoder", str(error))]

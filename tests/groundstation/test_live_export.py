@@ -13,6 +13,7 @@ from hand_fed import Rig
 from page_client import PASSWORD, PageClient, free_port
 from served import Served, serving
 from test_exports import diggs_says, dxf_says, geojson_says, ifc_says, witsml_says
+from three_holes import write_three_holes
 
 from groundstation.gateway.page.exports import ENDINGS, EXPORTED, MEDIA
 from groundstation.gateway.page.page_settings import PageSettings
@@ -27,13 +28,7 @@ pytestmark = [
 LEANS = (0.4, 0.9, 1.7, 2.2)  # deg, at 2, 4, 6, 8 m
 COLLAR = (5_806_123.456, 389_000.125, 35.5)
 PLACE = f"origin={','.join(map(str, COLLAR))}&grid_crs=EPSG:25833"
-WALL = """
-name = "three holes"
-radius_m = 0.60
-thickness_m = 0.80
-length_m = 8.0
-heads = "heads.csv"
-stations = "s.csv"
+NORTH = """
 north = "grid"
 northing_m = 5806000.0
 easting_m = 389000.0
@@ -200,11 +195,8 @@ def test_a_hole_without_a_station_is_refused(tmp_path: Path) -> None:
 def test_a_rig_of_a_wall_exports_the_wall_and_its_hole_where_they_stand(tmp_path: Path) -> None:
     import ezdxf
 
-    (tmp_path / "wall.toml").write_text(WALL)
-    (tmp_path / "heads.csv").write_text("column,north_m,east_m\nH1,0,0\nH2,0.75,0\nH3,1.5,0\n")
-    rows = "".join(f"{hole},{md},0,0\n" for hole in ("H1", "H3") for md in (0, 4, 8))
-    (tmp_path / "s.csv").write_text(f"column,md_m,inclination_deg,azimuth_deg\n{rows}")
-    rig, port = Rig(tmp_path / "ground", target=8.0, wall=tmp_path / "wall.toml", hole="H2"), free_port()
+    wall = write_three_holes(tmp_path, NORTH)
+    rig, port = Rig(tmp_path / "ground", target=8.0, wall=wall, hole="H2"), free_port()
     rig.run(5.0)
     for stop in (1, 2):
         rig.drill(stop, 0.3)

@@ -7,30 +7,20 @@ import pytest
 from hand_fed import Rig
 from page_client import PageClient, free_port
 from served import serving
+from three_holes import write_three_holes
 
 from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.gateway.page.reports import ReportTypesetter
 from groundstation.gateway.page.request_guard import RequestError
 
 pytestmark = pytest.mark.slow
-WALL = """
-name = "three holes"
-radius_m = 0.60
-thickness_m = 0.80
-length_m = 8.0
-heads = "heads.csv"
-stations = "s.csv"
-"""
 
 
 @pytest.fixture
 def rig(tmp_path: Path) -> Rig:
     """The middle hole of three, two stops deep."""
-    (tmp_path / "wall.toml").write_text(WALL)
-    (tmp_path / "heads.csv").write_text("column,north_m,east_m\nH1,0,0\nH2,0.75,0\nH3,1.5,0\n")
-    rows = "".join(f"{hole},{md},0,0\n" for hole in ("H1", "H3") for md in (0, 4, 8))
-    (tmp_path / "s.csv").write_text(f"column,md_m,inclination_deg,azimuth_deg\n{rows}")
-    rig = Rig(tmp_path / "ground", target=8.0, wall=tmp_path / "wall.toml", hole="H2")
+    wall = write_three_holes(tmp_path)
+    rig = Rig(tmp_path / "ground", target=8.0, wall=wall, hole="H2")
     rig.run(5.0)
     return rig
 

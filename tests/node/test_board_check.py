@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import math
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +18,7 @@ from emulated_mpu import EmulatedMpu
 
 from borechain.pki.rig_keys import add_tube, init_rig
 from node.process import board_places
-from node.process.board_command import board
+from node.process.board_command import board, is_turning
 from node.process.board_sensors import check_encoder, check_imu
 from node.process.drivers.mpu_imu import MpuImu
 from node.process.drivers.quadrature import QuadratureFile
@@ -44,7 +45,7 @@ class Board:
     """A board whose parts are emulated; time is that of its sensor."""
 
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.folder, self.now, self.turn = folder, 100.0, 90.0
+        self.folder, self.now, self.turn, self.halves = folder, 100.0, 90.0, 0
         self.chip = EmulatedMpu()
         self.driver = MpuImu(self.chip.connect, sleep=lambda _: None)
         self.counter = EmulatedCounter(folder / "counters")
@@ -80,8 +81,11 @@ class Board:
             force = self.force * (np.array([0.2, -0.3, -9.79]) + 15.0 * self.noise * noise)
             self.chip.live(seconds * self.quicker / 26.0, tuple(rate), tuple(force), self.temperature)
 
-    def turn_head(self) -> None:
-        self.counter.turn_to(min(self.step * round(self.turn * 4096 / 360.0), self.stops_at))
+    def turn_head(self) -> bool:
+        """Turn on by a half; whether there is more to come."""
+        self.halves += 1
+        self.counter.turn_to(min(self.step * round(self.halves * self.turn * 2048 / 360.0), self.stops_at))
+        return self.halves < 2
 
     def findings(self) -> dict[str, tuple[bool, str]]:
         program = self.programs / "ip"
@@ -199,3 +203,17 @@ def test_the_command_prints_a_line_a_part_and_ends_by_what_it_found(tmp_path: Pa
     assert done.exit_code == 1
     assert "WRONG  can no-such-interface" in done.stdout
     assert CliRunner().invoke(board, ["check", "--imu", "bmp280:1"]).exit_code == 2
+
+
+def test_a_head_is_turned_until_enter_or_the_end_of_the_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    for said in (b"\n", b""):
+        read, write = os.pipe()
+        with os.fdopen(read) as told:
+            monkeypatch.setattr("sys.stdin", told)
+            assert is_turning()
+            os.write(write, said)
+            if not said:
+                os.close(write)
+            assert not is_turning()
+            if said:
+                os.close(write)

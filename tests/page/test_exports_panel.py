@@ -9,20 +9,13 @@ import pytest
 from beating import Beating, beating
 from page_client import PageClient
 from playwright.sync_api import Page, expect
+from three_holes import write_three_holes
 
 from groundstation.gateway.page.exports import ENDINGS
 from groundstation.survey.exports.export_request import FORMATS
 
 pytestmark = pytest.mark.slow
 Open = Callable[..., Page]
-WALL = """
-name = "three holes"
-radius_m = 0.60
-thickness_m = 0.80
-length_m = 8.0
-heads = "heads.csv"
-stations = "s.csv"
-"""
 
 
 @pytest.fixture(scope="module")
@@ -69,11 +62,8 @@ def test_a_refusal_is_told_beside_the_button(rig: Beating, watched: Open) -> Non
 
 
 def test_a_rig_of_a_wall_offers_it(tmp_path: Path, watched: Open) -> None:
-    (tmp_path / "wall.toml").write_text(WALL)
-    (tmp_path / "heads.csv").write_text("column,north_m,east_m\nH1,0,0\nH2,0.75,0\nH3,1.5,0\n")
-    rows = "".join(f"{hole},{md},0,0\n" for hole in ("H1", "H3") for md in (0, 4, 8))
-    (tmp_path / "s.csv").write_text(f"column,md_m,inclination_deg,azimuth_deg\n{rows}")
-    with beating(tmp_path / "ground", (0.3, 0.3), wall=tmp_path / "wall.toml", hole="H2") as rig:
+    wall = write_three_holes(tmp_path)
+    with beating(tmp_path / "ground", (0.3, 0.3), wall=wall, hole="H2") as rig:
         page = watched(rig.url)
         expect(page.locator("#export-wall")).to_be_enabled()
         expect(page.locator("#export-origin")).to_be_disabled()

@@ -13,6 +13,13 @@ from node.process.tube_options import SETTING_OPTIONS, TubeRequest
 from telemetry.runtime.typed_options import gather_options
 
 TARGETS = ("c", "cortex-m4", "cortex-m0plus", "riscv32")
+out_option = click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("firmware-build"),
+    show_default=True,
+    help="Folder of what is written.",
+)
 
 
 @click.group()
@@ -30,13 +37,7 @@ def firmware() -> None:
     "--target", type=click.Choice(TARGETS), default="c", show_default=True, help="Chip; c: the source alone, for any."
 )
 @click.option("--imus", type=click.IntRange(1, 8), default=8, show_default=True, help="Most IMUs of a node.")
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=Path("firmware-build"),
-    show_default=True,
-    help="Folder of what is built.",
-)
+@out_option
 @plain_faults
 def build(target: str, imus: int, out: Path) -> None:
     """Write the integer step as one C99 file with its header, and compile it for a chip.
@@ -62,13 +63,7 @@ def build(target: str, imus: int, out: Path) -> None:
 @click.option(
     "--room", type=click.IntRange(1, 8), default=8, show_default=True, help="IMUs that the chip's program has room for."
 )
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=Path("firmware-build"),
-    show_default=True,
-    help="Folder of what is written.",
-)
+@out_option
 @plain_faults
 def provision(request: TubeRequest, room: int, out: Path) -> None:
     """Write what a tube's chip begins with, as an image for a page of its flash, and the header that loads it.
