@@ -17,6 +17,7 @@ from emulated_encoders import EmulatedCounter
 from emulated_mpu import EmulatedMpu
 
 from borechain.pki.rig_keys import add_tube, init_rig
+from node.firmware.encoder_node import EncoderSample
 from node.process import board_places
 from node.process.board_command import board, is_turning
 from node.process.board_sensors import check_encoder, check_imu
@@ -217,3 +218,24 @@ def test_a_head_is_turned_until_enter_or_the_end_of_the_input(monkeypatch: pytes
             assert not is_turning()
             if said:
                 os.close(write)
+
+
+def test_a_head_that_turns_is_read_at_every_look(tmp_path: Path) -> None:
+    """The kernel keeps the edges of one turn of GPIO lines, and not of more."""
+    counter, counts, looks = EmulatedCounter(tmp_path), list[int](), iter(range(1, 6))
+
+    class Watched(QuadratureFile):
+        def read(self, now: float) -> EncoderSample:
+            found = super().read(now)
+            counts.append(found.count)
+            return found
+
+    def turn_on() -> bool:
+        look = next(looks, None)
+        if look is not None:
+            counter.turn_to(1024 * look)
+        return look is not None
+
+    found = check_encoder(Watched(counter.place / "count"), 450.0, lambda: 0.0, turn_on)
+    assert all(line.good for line in found)
+    assert counts == [0, 1024, 2048, 3072, 4096, 5120, 5120]

@@ -187,3 +187,13 @@ def test_a_head_that_starts_is_no_string_that_turns(aidings_missed: int) -> None
         resting.cycle((k + 1) * 20.0 * spin, 10.0 * (k + 1) * DEG)
     resting.cycle(60.0 * spin, 30.0 * DEG, resting=False)
     assert resting.creep["doubt"] == 0.0
+
+
+@pytest.mark.parametrize("of_drive", [{"torque": 200.0}, {"holding": 1}, {"wound": 1}])
+def test_what_the_drive_turns_a_string_by_is_its_twist_and_no_doubt(of_drive: dict[str, float]) -> None:
+    """Each by itself: a torque in the aiding, a drive that holds, and one that has not let go yet."""
+    twisting = Resting(0.0)
+    for name, value in of_drive.items():
+        twisting.node["twist"][name] = value
+    assert twisting.rest(np.full(CYCLES, 0.1)).doubt_deg == 0.0
+    assert Resting(0.0).rest(np.full(CYCLES, 0.1)).doubt_deg > 1.0
