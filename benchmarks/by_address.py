@@ -42,7 +42,7 @@ def holding_copy(nodes: Any, settings: Any, parameters: Any, readings: Any, mome
 
 def compile_time(function: Any, *arguments: Any) -> float:
     """Time (s) to compile ``function`` for the types of ``arguments``."""
-    made = njit(error_model="numpy", no_cfunc_wrapper=True)(function)
+    made = njit(error_model="numpy", no_cfunc_wrapper=True)(function)  # type: ignore[call-overload]  # not told of
     begun = time.thread_time()
     made.compile(tuple(map(typeof, arguments)))
     return time.thread_time() - begun

@@ -71,7 +71,9 @@ INPUT = np.dtype(
 HEARD = ("yaw", "yaw_var", "systematic_var", "offset", "valid_at", "sequence", "hops")
 OUTPUT = np.dtype([("status", "i8"), ("yaw", "u4"), ("var", "f8", (STATES,))], align=True)
 FIXED_INPUT, FIXED_OUTPUT = (
-    np.dtype([(name, "u4" if name == "yaw" and d is OUTPUT else "i8", d[name].shape) for name in d.names], align=True)
+    np.dtype(
+        [(name, "u4" if name == "yaw" and d is OUTPUT else "i8", d[name].shape) for name in d.names or ()], align=True
+    )
     for d in (INPUT, OUTPUT)
 )
 Runner = Callable[[Any, Any, Any, Any, Any, int], None]
@@ -167,7 +169,8 @@ def build_c(folder: Path, *extra: str) -> Runner:
         getattr(loaded, name).restype = ctypes.c_size_t
     for which, dtype in enumerate(LAYOUTS):
         last = (dtype.names or ())[-1]
-        ours = dtype.itemsize, (dtype.fields or {})[last][1]
+        offset = int(dtype.fields[last][1]) if dtype.fields else 0
+        ours = dtype.itemsize, offset
         if ours != (loaded.node_size(which), loaded.node_end(which)):
             raise EnvironmentFault(
                 f"{SOURCE}: its record {which} is laid out differently from node/kernels/record/filter_record.py"

@@ -8,6 +8,7 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -80,13 +81,11 @@ def measured(folder: Path) -> dict[str, dict[str, float]]:
     found = {}
     for message in UP:
         payload, told = encode_message(message), tube.close_up(encode_message(message))
-        found[type(message).__name__] = both(
-            lambda p=payload: tube.close_up(p), lambda t=told: base.hear(t, 1, 1.0), message
-        )
+        found[type(message).__name__] = both(partial(tube.close_up, payload), partial(base.hear, told, 1, 1.0), message)
     for message in DOWN:
         payload, told = encode_message(message), base.close_down(encode_message(message), 1) or b""
         found[type(message).__name__] = both(
-            lambda p=payload: base.close_down(p, 1), lambda t=told: tube.is_told(t, 1.0, is_offer=False), message
+            partial(base.close_down, payload, 1), partial(tube.is_told, told, 1.0, is_offer=False), message
         )
     encoder = opened(folder, ENCODER, Side).measurement
     sealed = encoder.close(AIDING)

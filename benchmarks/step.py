@@ -64,6 +64,7 @@ def inputs_of(world: World) -> Inputs:
         clock_var=CLOCK_STD**2 * np.arange(1.0, tubes + 1.0),
         measured=aidings,
         is_sent=np.ones(cycles, np.bool_),
+        is_run=np.ones(cycles, np.bool_),
         dated_late=none,
         locked=True,
     )
@@ -91,8 +92,8 @@ class String:
             )
             for k, one in enumerate(settings)
         ]
-        settings = np.concatenate([tube.settings_record for tube in self.tubes])
-        self.arrays = StringNodes(self.nodes, settings, self.corrections)
+        records = np.concatenate([tube.settings_record for tube in self.tubes])
+        self.arrays = StringNodes(self.nodes, records, self.corrections)
 
 
 def node_by_node(string: String, inputs: Inputs) -> Callable[[], None]:
@@ -134,13 +135,13 @@ def string_by_string(string: String, inputs: Inputs) -> Callable[[], None]:
     return run
 
 
-def compiled(string: String, inputs: Inputs) -> Callable[[], None]:
+def compiled(string: String, inputs: Inputs) -> Callable[[], object]:
     """All cycles in one call."""
     drilled = drilling(string, inputs)
     return lambda: drilled(0, len(inputs.schedule.ends))
 
 
-def drilling(string: String, inputs: Inputs) -> Callable[[int, int], None]:
+def drilling(string: String, inputs: Inputs) -> Callable[[int, int], object]:
     """The kernel of a string, from a cycle to another."""
     count, memory = len(string.tubes), new_memory()
     hops, shifts = np.zeros(count, HOP), np.zeros(count)
