@@ -242,11 +242,16 @@ def _design_findings(columns: Columns, found: Joints, required: float, allowed: 
         wide = bad[j] & (apart[j] > limit[j] + 1e-9)
         for first, last in true_runs(wide):
             top, bottom = float(columns.depths[first]), float(columns.depths[last])
-            most = first + int(np.argmax(apart[j, first : last + 1]))
-            text = (
-                f"the design of joint {name} opens from {top:g} to {bottom:g} m: its axes are up to "
-                f"{apart[j, most]:.3f} m apart, a joint of {required:g} m needs {limit[j, most]:.3f} m or less"
-            )
+            most = first + int(np.argmax((apart[j] - limit[j])[first : last + 1]))
+            text = f"the design of joint {name} opens from {top:g} to {bottom:g} m: "
+            if limit[j, most] > 0.0:
+                text += (
+                    f"its axes are up to {apart[j, most]:.3f} m apart, a joint of {required:g} m needs "
+                    f"{limit[j, most]:.3f} m or less"
+                )
+            else:
+                radius = float(np.min(columns.radii[pair, most]))
+                text += f"a column of {radius:g} m radius makes no joint of {required:g} m"
             out.append(Finding(FindingKind.DESIGN, name, top, bottom, text))
     return out
 
