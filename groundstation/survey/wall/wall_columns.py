@@ -37,6 +37,7 @@ from groundstation.survey.well.methods import station_positions, station_tangent
 Array = npt.NDArray[np.float64]
 FLATTEST = 0.17  # cosine (80 deg) between a hole and the planes' normal, below which it is not cut by them
 SAME_END = 1e-6  # m
+MOST_PLANES = 100_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,6 +186,11 @@ def _depths(plans: Sequence[ColumnPlan], frame: Array, assumed: Assumptions) -> 
     top, bottom = float(np.min(heads @ frame[2])), float(np.max(toes @ frame[2]))
     stated = assumed.tight
     top, bottom = top if stated.top is None else stated.top, bottom if stated.bottom is None else stated.bottom
+    if bottom - top > MOST_PLANES * assumed.step:
+        raise SurveyError(
+            f"depth_step_m: expected at most {MOST_PLANES} planes across the columns, got them {assumed.step:g} m "
+            f"apart from {top:g} to {bottom:g} m"
+        )
     return np.append(np.arange(top, bottom - 1e-3, assumed.step), bottom)
 
 

@@ -77,7 +77,7 @@ NOT_NEGATIVE = (
 MOST = {
     "allowed_probability": 0.5, "radius_cv": MOST_RADIUS_CV, "radius_correlation": 1.0, "unsurveyed_percent": 100.0,
     "inclination_deg": 180.0, "azimuth_deg": 360.0, "dip_deg": 90.0, "latitude_deg": 90.0, "declination_deg": 180.0,
-    "convergence_deg": 180.0, "north_of_site_deg": 360.0,
+    "convergence_deg": 180.0, "north_of_site_deg": 360.0, "depth_step_m": 2.0,
 }  # fmt: skip
 
 

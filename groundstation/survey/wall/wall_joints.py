@@ -177,7 +177,7 @@ def extra_column(columns: Columns, found: Joints, joint: int, required: float) -
         kept = [columns.centres[a, thin], columns.centres[b, thin]]
         middle = 0.5 * (kept[0] + kept[1])
         north, east = 0.5 * (middle.min(axis=0) + middle.max(axis=0))
-    thinnest = np.min(columns.radii[[a, b]][:, thin])
+    thinnest = np.asarray(np.min(columns.radii[[a, b]][:, thin]))
     limit = float(limit_distances(thinnest, thinnest, required))
     reach = max((float(np.max(np.hypot(way[:, 0] - north, way[:, 1] - east))) for way in kept), default=np.inf)
     depths = columns.depths[thin]

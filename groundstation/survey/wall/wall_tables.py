@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
 from groundstation.survey.files.column_tables import read_table_columns
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
@@ -182,7 +183,7 @@ def _number(where: str, key: str, text: str) -> float:
         raise SurveyError(
             f"{where}: {key}: expected a number{'' if low < 0.0 else ' that is not negative'}, got {text!r}"
         )
-    return value
+    return RANGES[key].check(f"{where}: {key}", value) if key in RANGES else value
 
 
 def _status(where: str, text: str) -> ColumnStatus:

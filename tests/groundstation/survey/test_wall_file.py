@@ -112,7 +112,7 @@ def test_a_grid_with_good_joints_has_a_void_in_every_cell(tmp_path: Path) -> Non
     heads = "column,north_m,east_m\n" + "".join(
         f"C{3 * a + b + 1},{0.9 * a},{0.9 * b}\n" for a in range(3) for b in range(3)
     )
-    path = made(tmp_path, heads, holes(9), thickness=0.5, more='layout = "grid"\nspacing_m = 0.9\ndepth_step_m = 5')
+    path = made(tmp_path, heads, holes(9), thickness=0.5, more='layout = "grid"\nspacing_m = 0.9\ndepth_step_m = 2')
     _, found = judged(path)
     assert not np.any(found.joints.thickness < 0.5)
     assert found.verdict is WallVerdict.NOT_TIGHT
@@ -125,7 +125,7 @@ def test_a_grid_that_covers_its_plane_is_tight(tmp_path: Path) -> None:
     heads = "column,north_m,east_m\n" + "".join(
         f"C{3 * a + b + 1},{0.7 * a},{0.7 * b}\n" for a in range(3) for b in range(3)
     )
-    _, found = judged(made(tmp_path, heads, holes(9), more='layout = "grid"\nspacing_m = 0.7\ndepth_step_m = 5'))
+    _, found = judged(made(tmp_path, heads, holes(9), more='layout = "grid"\nspacing_m = 0.7\ndepth_step_m = 2'))
     assert (found.verdict, found.findings) == (WallVerdict.TIGHT, [])
 
 
