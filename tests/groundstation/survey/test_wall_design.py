@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from groundstation.errors import SurveyError
@@ -66,3 +67,34 @@ def test_a_column_too_thin_for_its_joint_leaves_the_wall_judged(
     assert said[0].text.endswith(f": a column of {radius:g} m radius makes no joint of 0.8 m")
     assert [extra.closes for _, extra in found.extras] == [False, False]
     assert found.system.probability == 1.0
+
+
+LAYERS = {
+    "from the heads on": "from_m = 0\nradius_m = 0.58\nradius_cv = 0.01",
+    "from above the heads on": "from_m = -3\nradius_m = 0.58\nradius_cv = 0.01",
+    "below the toes": "from_m = 30\nradius_m = 0.58\nradius_cv = 0.01",
+}
+
+
+@pytest.mark.parametrize("layout", ["line", "grid"])
+@pytest.mark.parametrize("name", LAYERS)
+def test_layers_without_a_plane_count_for_nothing(tmp_path: Path, name: str, layout: str) -> None:
+    """As a wall whose own radius is that of the only layer which has planes."""
+    heads = block("P", 0.0) if layout == "grid" else {name: (0.0, 0.7 * k) for k, name in enumerate("ABC")}
+    keys = f'layout = "{layout}"\nspacing_m = 0.7\nradius_cv = 0.01\n'
+    found = judge_wall(read_wall(made(tmp_path, heads, keys + f"[[layer]]\n{LAYERS[name]}\n")))
+    path = made(tmp_path, heads, keys)
+    if name != "below the toes":
+        path.write_text(path.read_text().replace("radius_m = 0.6", "radius_m = 0.58"))
+    alike = judge_wall(read_wall(path))
+    assert (found.verdict, found.system) == (alike.verdict, alike.system)
+    np.testing.assert_array_equal(found.joints.thickness, alike.joints.thickness)
+
+
+def test_a_layer_thinner_than_a_step_is_judged(tmp_path: Path) -> None:
+    heads = {name: (0.0, 0.7 * k) for k, name in enumerate("ABC")}
+    more = "[[layer]]\nfrom_m = 3.1\nradius_m = 0.45\n[[layer]]\nfrom_m = 3.3\nradius_m = 0.6\n"
+    wall = read_wall(made(tmp_path, heads, more))
+    np.testing.assert_allclose(wall.columns.depths, sorted([*np.arange(0.0, LENGTH + 0.1, 0.5), 3.1, 3.3]))
+    thin = [one for one in judge_wall(wall).findings if one.kind is FindingKind.THIN]
+    assert [(one.what, one.top, one.bottom) for one in thin] == [("A-B", 3.1, 3.1), ("B-C", 3.1, 3.1)]
