@@ -38,15 +38,14 @@ def find_pairs(path: Path, layout: str, spacing: float | None, columns: Columns,
         When there are none, or they leave a grid in parts.
     """
     designed = np.array([k for k, remedy in enumerate(remedies) if not remedy.asked], np.intp)
-    some = columns.subset(designed)
     if layout == "grid":
-        found = neighbours_in_grid(some.designs, spacing or 0.0)
+        found = neighbours_in_grid(columns.designs[designed], spacing or 0.0)
     else:
         found = neighbours_in_line(len(designed), closed=layout == "shaft")
     if not len(found):
         raise SurveyError(f"{path}: expected at least two columns next to each other, got {len(designed)}")
     if layout == "grid":
-        _check_connected(path, some, found, spacing or 0.0)
+        _check_connected(path, columns.subset(designed), found, spacing or 0.0)
     return designed[found]
 
 
