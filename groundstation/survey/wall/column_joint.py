@@ -98,7 +98,7 @@ def probability_beyond(mean: Array, cov: Array, limit: Array | float) -> Array:
     density = np.exp(-0.5 * ((x - u[..., None]) / su[..., None]) ** 2) / (su[..., None] * math.sqrt(math.tau))
     size, far = np.abs(v), chord.min(axis=-1, initial=np.inf)
     tails = ndtr((size[..., None] - chord) / sv[..., None])
-    both = (size + far) / sv < NO_TAIL  # beyond that the tail of the other side is no number above 0
+    both = (size + far) / sv < NO_TAIL  # beyond that the tail of the other side is 0
     tails[both] += ndtr((-chord[both] - size[both, None]) / sv[both, None])
     inside = np.sum(weights * density * tails * chord, axis=-1) * 0.5 * (a2 - a1)
     return np.asarray(np.clip(outside + inside, 0.0, 1.0))
