@@ -231,9 +231,10 @@ def test_nothing_that_is_said_changes_between_the_planes_that_are_told(tmp_path:
     begun = ColumnSurvey(own.md[:2], own.inclination[:2], own.azimuth[:2], covs=own.covs[:2])
     said: dict[int, set[tuple[str, ...]]] = {}
     for bit in np.arange(STEP + 0.02, LENGTH + 0.01, 0.07):
-        found = live.judged(begun, float(bit)).judgement
-        assert found is not None
-        told = tuple(finding.text for finding in found.findings if "is missing from" in finding.text)
+        now = live.judged(begun, float(bit))
+        assert now.judgement is not None
+        assert now.wall.built.ends[now.own] == bit  # which is told anew however little it has moved
+        told = tuple(finding.text for finding in now.judgement.findings if "is missing from" in finding.text)
         said.setdefault(live.plane_of(float(bit)), set()).add(told)
     assert [len(texts) for texts in said.values()] == [1] * len(said)
     assert len(said) >= 12  # half a metre apart, and two of layers

@@ -213,6 +213,7 @@ def test_a_remedial_column_stands_in_for_one_that_is_not_there(tmp_path: Path) -
         (row_of(2), "", "", "length_m is missing; no column was surveyed"),
         (row_of(2), holes(2), "allowed_probability = 0.9", "allowed_probability: expected at most 0.5"),
         (row_of(2), holes(2), "[[layer]]\nradius_m = 0.5", "layer 1: from_m is missing"),
+        (row_of(2), holes(2), "[[layer]]\nfrom_m = 3\n[[layer]]\nfrom_m = 3", "expected from_m beyond 3 m, got 3 m"),
         (row_of(2), HOLE.format("C1", 0, 0, 20) + HOLE.format("C2", 88, 0, 20), "", "C2: at 0 m the hole runs"),
     ],
 )  # fmt: skip
