@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -139,6 +140,17 @@ def test_covariances_are_those_that_clients_are_answered(page: PageClient) -> No
         assert matrix.variance_nn.value == point["covariance_m2"][0][0]
         assert matrix.variance_ne.value == point["covariance_m2"][0][1]
         assert matrix.variance_evert.value == point["covariance_m2"][1][2]
+
+
+def test_the_deviation_is_that_of_the_deepest_station(page: PageClient) -> None:
+    """The hole is designed vertical: its toe deviates by where the last of its places lies."""
+    *_, last = csv.DictReader(page.get("/api/tables/trajectory.csv").body.decode().splitlines())
+    text = page.get(f"/api/exports/hole.diggs?{PLACE}").body.decode()
+    found = re.search(r"tipDeviationNorth (\S+) m, tipDeviationEast (\S+) m", text)
+    assert found
+    assert abs(float(last["north_m"])) + abs(float(last["east_m"])) > 0.05
+    for told, name in zip(found.groups(), ("north_m", "east_m"), strict=True):
+        assert float(told) == pytest.approx(float(last[name]), abs=2e-3)
 
 
 def test_every_validator_accepts_a_live_file(page: PageClient, tmp_path: Path) -> None:

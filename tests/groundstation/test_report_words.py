@@ -146,6 +146,10 @@ def test_a_hole_has_a_report_of_its_own(made: Any) -> None:
     assert (north, east) == (pytest.approx(-0.558, abs=2e-3), pytest.approx(0.833, abs=2e-3))
     assert down < 30.0
     sections = {section.title: section for section in hole.sections}
+    stds_mm = [float(cell) for cell in sections["Stations"].rows[-1][-3:]]  # one sigma, rounded to 0.1 mm
+    for half, std_mm in zip((2, 4, 6), stds_mm, strict=True):
+        assert std_mm > 1.0
+        assert 1e3 * float(found[half]) == pytest.approx(1.959964 * std_mm, abs=0.7)
     assert dict(sections["Instrument"].facts)["Calibration"] == "not stated"
     assert [row[0] for row in sections["Stations"].rows] == ["0.00", "10.00", "20.00", "30.00"]
     assert hole.good

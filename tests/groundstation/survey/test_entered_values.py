@@ -24,7 +24,7 @@ from groundstation.survey.wall.wall_verdict import FindingKind, WallVerdict
 from telemetry.errors import CalibrationError
 
 HEAD = "MD (m),Inc (deg),Azi (deg)\n"
-NULLS = ("-999.25", "-9999", "-99999", "-999.2500", "1e30", "1E+30", "", "-", "N/A", "null")
+NULLS = ("-999.25", "-9999", "-99999", "-999.2500", "1e30", "1E+30", "-1e30", "-1E+31", "", "-", "N/A", "null")
 SITE = SiteFigures()
 
 
@@ -127,6 +127,16 @@ def test_what_steel_hardly_does_is_a_warning(tmp_path: Path, rows: str, kind: st
     found = answer(tmp_path, text)["warnings"]
     assert [warning["kind"] for warning in found] == ([] if kind is None else [kind])
     assert all("deg" in warning["text"] for warning in found)
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize(("between", "kinds"), [(20.0, []), (22.0, ["spike"])])
+def test_a_station_is_alone_where_it_departs_from_both_its_neighbours(
+    way: int, between: float, kinds: list[str]
+) -> None:
+    """11.6 and 10 deg: 8.4 and 10 deg from 20, where 9.8 are allowed on both sides; a hole is the same upside down."""
+    md, inclination = np.array([0.0, 30.0, 60.0]), np.radians([10.0, between, 11.6])[::way]
+    assert [warning.kind for warning in station_warnings(md, inclination, np.zeros(3), "h")] == kinds
 
 
 @given(st.lists(st.tuples(st.floats(0.2, 30.0), st.floats(-1.0, 1.0), st.floats(0.0, 360.0)), min_size=2, max_size=30))
