@@ -178,7 +178,7 @@ def test_who_may_not_read_may_not_export(served: tuple[Served, PageClient]) -> N
         ("hole.geojson", 409, "geojson: expected --grid-crs and --origin"),
         ("hole.dxf?grid_crs=EPSG:25833", 409, "--grid-crs: expected --origin NORTHING EASTING HEIGHT"),
         ("hole.dxf?origin=1,2", 409, "--origin: expected NORTHING,EASTING,HEIGHT in m, got '1,2'"),
-        ("hole.dxf?origin=1,nan,2", 409, "--origin: expected three numbers"),
+        ("hole.dxf?origin=1,nan,2", 409, "--origin: expected a coordinate of -1e+08..1e+08 m, got nan"),
         ("hole.dxf?depth=3", 400, "parameter depth: expected one of origin, grid_crs"),
         (f"hole.geojson?{PLACE.replace('25833', '99999')}", 409, "EPSG:99999"),
     ],
