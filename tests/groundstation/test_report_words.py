@@ -31,6 +31,7 @@ DATA = Path(__file__).parents[1] / "data" / "calibration"
 # what is the same in another language, names of the test, and names of models, methods and sources
 SAME = {
     "de": "Revision Software sigma", "fr": "Document Site Joints joint Date vertical source Stations attitude sigma",
+    "es": "Software sigma vertical", "it": "Software sigma",
 }  # fmt: skip
 NAMES = {
     "North pit wall", "Station square, lot 3", "Bohr and Sons", "City railways", "Station to Station",
@@ -179,7 +180,7 @@ def test_the_tables_have_the_phrases_of_each_other() -> None:
     tables = [word_table(language) for language in OTHERS]
     known = [{*table._exact, *(pattern.pattern for pattern, _ in table._patterns)} for table in tables]
     assert all(words == known[0] for words in known)
-    with pytest.raises(SurveyError, match="--language: expected one of de, en, fr, got 'xx'"):
+    with pytest.raises(SurveyError, match="--language: expected one of de, en, es, fr, it, got 'xx'"):
         word_table("xx")
 
 

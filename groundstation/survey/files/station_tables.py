@@ -214,7 +214,8 @@ def _other_columns(
     path: Path, table: FieldTable, columns: list[NamedColumn], kept: list[int], decimal: str
 ) -> dict[str, Array]:
     """Further columns of numbers, by their names; those that an instrument may ask for hold good numbers or none."""
-    taken, found = {column.place for column in columns}, {}
+    taken = {column.place for column in columns}
+    found: dict[str, Array] = {}
     for place, name in enumerate(table.header):
         cells = [table.rows[k][place] for k in kept]
         if place in taken or not name or name in STATIONS:
