@@ -31,6 +31,7 @@ DATA = Path(__file__).parents[1] / "data" / "calibration"
 # what is the same in another language, names of the test, and names of models, methods and sources
 SAME = {
     "de": "Revision Software sigma", "fr": "Document Site Joints joint Date vertical source Stations attitude sigma",
+    "es": "Software sigma vertical", "it": "Software sigma",
 }  # fmt: skip
 NAMES = {
     "North pit wall", "Station square, lot 3", "Bohr and Sons", "City railways", "Station to Station",
@@ -146,6 +147,10 @@ def test_a_hole_has_a_report_of_its_own(made: Any) -> None:
     assert (north, east) == (pytest.approx(-0.558, abs=2e-3), pytest.approx(0.833, abs=2e-3))
     assert down < 30.0
     sections = {section.title: section for section in hole.sections}
+    stds_mm = [float(cell) for cell in sections["Stations"].rows[-1][-3:]]  # one sigma, rounded to 0.1 mm
+    for half, std_mm in zip((2, 4, 6), stds_mm, strict=True):
+        assert std_mm > 1.0
+        assert 1e3 * float(found[half]) == pytest.approx(1.959964 * std_mm, abs=0.7)
     assert dict(sections["Instrument"].facts)["Calibration"] == "not stated"
     assert [row[0] for row in sections["Stations"].rows] == ["0.00", "10.00", "20.00", "30.00"]
     assert hole.good
@@ -175,7 +180,7 @@ def test_the_tables_have_the_phrases_of_each_other() -> None:
     tables = [word_table(language) for language in OTHERS]
     known = [{*table._exact, *(pattern.pattern for pattern, _ in table._patterns)} for table in tables]
     assert all(words == known[0] for words in known)
-    with pytest.raises(SurveyError, match="--language: expected one of de, en, fr, got 'xx'"):
+    with pytest.raises(SurveyError, match="--language: expected one of de, en, es, fr, it, got 'xx'"):
         word_table("xx")
 
 
