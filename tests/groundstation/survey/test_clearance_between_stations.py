@@ -103,13 +103,13 @@ def test_holes_that_meet_err_across_both_of_them() -> None:
 HAIR = 5e-4  # m, by which one pass is nearer than the other
 
 
-def hairpin(asides: tuple[float, float], east_m: float) -> ClearanceHole:
+def hairpin(asides: tuple[float, float], east_m: float, wide: float = 8.0) -> ClearanceHole:
     """A hole that falls past a level leg at one distance aside, and 8 m further east rises past it at another."""
     turn = np.linspace(0.0, math.pi, 25)
     down, up = np.arange(-20.0, 10.0, 0.5), np.arange(9.5, -20.0, -0.5)
-    east = np.concatenate([np.zeros(len(down)), 4.0 - 4.0 * np.cos(turn), np.full(len(up), 8.0)])
-    depth = np.concatenate([down, 10.0 + 4.0 * np.sin(turn), up])
-    places = np.stack([asides[0] + (asides[1] - asides[0]) * east / 8.0, east_m + east, depth], axis=1)
+    east = np.concatenate([np.zeros(len(down)), 0.5 * wide * (1.0 - np.cos(turn)), np.full(len(up), wide)])
+    depth = np.concatenate([down, 10.0 + 0.5 * wide * np.sin(turn), up])
+    places = np.stack([asides[0] + (asides[1] - asides[0]) * east / wide, east_m + east, depth], axis=1)
     ways = np.gradient(places, axis=0)
     ways /= np.linalg.norm(ways, axis=1)[:, None]
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
@@ -134,10 +134,10 @@ def test_the_nearer_of_two_passes_by_one_long_leg_is_found(nearer: int) -> None:
 @pytest.mark.parametrize("nearer", [0, 1])
 @pytest.mark.parametrize("east_m", [45.50, 45.53, 45.56, 45.59])
 def test_of_two_passes_all_but_as_near_the_nearer_is_found(nearer: int, east_m: float) -> None:
-    """Samples lie an eighth of a metre apart there: the lowest of them may be beside the other pass."""
+    """Samples lie a tenth of a metre apart there, and the lowest of them may be beside the other pass."""
     asides = (0.5, 0.5 + HAIR) if nearer == 0 else (0.5 + HAIR, 0.5)
-    found = clearance_between(level_leg(), hairpin(asides, east_m), SITE)
-    assert float(found.nearest.md[0]) == pytest.approx(east_m + 8.0 * nearer, abs=0.05)
+    found = clearance_between(level_leg(), hairpin(asides, east_m, 8.05), SITE)
+    assert float(found.nearest.md[0]) == pytest.approx(east_m + 8.05 * nearer, abs=0.05)
     assert float(found.nearest.distance[0]) == pytest.approx(0.5, abs=1e-4)
 
 
