@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from forked_commands import run
+from matplotlib.text import Text
 from test_reports import DAY, write_wall
 
 from borechain import api
@@ -103,8 +104,10 @@ def test_no_title_of_a_picture_is_cut(tmp_path: Path) -> None:
     wall = read_wall(write_wall(tmp_path))
     figure = draw_wall(wall, judge_wall(wall))
     figure.canvas.draw()
-    titles = [axes.title for axes in figure.axes if axes.title.get_text()]
-    assert any("hatched: not surveyed" in title.get_text() for title in titles)
+    titles = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().startswith("All joints")]
+    assert [title.get_text() for title in titles] == [
+        "All joints (ring: the worst;\ncrossed: missing;\nhatched: not surveyed)"
+    ]
     for title in titles:
         extent = title.get_window_extent()
         assert extent.x0 >= 0.0
