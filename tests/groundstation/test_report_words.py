@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from forked_commands import run
+from matplotlib.text import Text
 from test_reports import DAY, write_wall
 
 from borechain import api
@@ -18,6 +19,7 @@ from groundstation.report.certificate import Identity, template_data, typeset_pn
 from groundstation.report.column_report import column_report
 from groundstation.report.document import Document, Origin, ReportPapers, document_content, report_pages, report_pdf
 from groundstation.report.hole_report import HolePapers, hole_report
+from groundstation.report.plots_wall import draw_wall
 from groundstation.report.wall_report import column_records, site_of, wall_report
 from groundstation.report.word_tables import known_languages, word_table
 from groundstation.survey.requests.survey_request import SurveyRequest
@@ -95,6 +97,22 @@ def texts(content: Any) -> Iterator[str]:
         for name, part in content.items():
             if name not in ("software", "svg", "figure", "language", "logo", "record", "day"):
                 yield from texts(part)
+
+
+def test_no_title_of_a_picture_is_cut(tmp_path: Path) -> None:
+    """A wall with missing and unsurveyed columns has the longest."""
+    wall = read_wall(write_wall(tmp_path))
+    figure = draw_wall(wall, judge_wall(wall))
+    figure.canvas.draw()
+    titles = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().startswith("All joints")]
+    assert [title.get_text() for title in titles] == [
+        "All joints (ring: the worst;\ncrossed: missing;\nhatched: not surveyed)"
+    ]
+    for title in titles:
+        extent = title.get_window_extent()
+        assert extent.x0 >= 0.0
+        assert extent.x1 <= figure.bbox.x1
+        assert extent.y1 <= figure.bbox.y1
 
 
 @pytest.mark.parametrize("language", OTHERS)

@@ -1,5 +1,6 @@
 """Every number that enters: values that stand for none, ranges, what hardly can be, in surveys and walls."""
 
+import dataclasses
 import json
 import math
 import re
@@ -23,6 +24,7 @@ from groundstation.survey.requests.wall_result import wall_result
 from groundstation.survey.wall.judged_wall import judge_wall, part_around
 from groundstation.survey.wall.wall_file import read_wall
 from groundstation.survey.wall.wall_verdict import FindingKind, WallVerdict
+from groundstation.survey.well.error_sources import Site
 from telemetry.errors import CalibrationError
 
 HEAD = "MD (m),Inc (deg),Azi (deg)\n"
@@ -321,6 +323,12 @@ def test_a_tie_on_of_no_values_is_refused(tmp_path: Path, text: str, named: str)
     with pytest.raises(SurveyError) as error:
         answer(tmp_path, f"{HEAD}0,0,0\n10,2,40\n", tie_on=tie)
     assert named in str(error.value)
+
+
+def test_a_place_is_in_radians() -> None:
+    place = SiteFigures(9.8, 49_000.0, 60.0, 3.0, 45.0).to_site()
+    expected = Site(9.8, 49_000.0, math.pi / 3.0, math.pi / 60.0, math.pi / 4.0)
+    assert dataclasses.astuple(place) == pytest.approx(dataclasses.astuple(expected), rel=1e-12)
 
 
 def test_places_beyond_the_earth_are_refused(tmp_path: Path) -> None:
