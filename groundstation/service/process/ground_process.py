@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import math
 import secrets
 import time
@@ -25,6 +26,8 @@ from groundstation.service.process.intake_tape import DEPTH, MESSAGE, ORDER, TIM
 from groundstation.service.process.learner import Learner
 from groundstation.service.process.operator_access import BlockUpload, OperatorAccess, Outgoing
 from groundstation.service.setup.setup_items import shown_marks
+from groundstation.service.setup.told_value import SetupKind, ToldValue
+from groundstation.service.string.doubled_numbers import NumberWatch
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seal_watch import SealWatch, refusal_of
 from telemetry.errors import DecodeError
@@ -133,6 +136,7 @@ class GroundProcess(Process):
         self.start_number = start
         self.listeners: list[Listener] = []
         self._stale: set[int] = set()
+        self._numbers_watch = NumberWatch()
         self._early: deque[DepthReading] = deque(maxlen=EARLY)
         self._setup_marks: tuple[object, ...] = ()  # of the setup as it was published
         self._beat_at = -math.inf
@@ -347,6 +351,9 @@ class GroundProcess(Process):
         """A message has come, from the string or from a recording."""
         self._note(MESSAGE, now, message)
         self._advance_time(now)
+        if isinstance(message, NodeState):
+            self._find_doubled(message)
+            message = self._string.doubled.state_apart(message)
         match message:
             case NodeState() if self._string.on_state(message, now):
                 self.model.recalibration.on_state(message)
@@ -364,6 +371,18 @@ class GroundProcess(Process):
             case BlockStatus():
                 self.operator.on_block_status(message)
         self.operator.publish_orders()
+
+    def _find_doubled(self, state: NodeState) -> None:
+        """Write down that two tubes give themselves one number, so that it stands until one of them is told."""
+        found, setup = self._numbers_watch.find_places(state), self.model.setup
+        if found is None or (state.tube in setup.doubled and setup.doubled.newest(state.tube).is_same(found)):
+            return
+        values = (float(found.epoch), found.at, float(found.upper), float(found.lower))
+        utc = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
+        entry = ToldValue(setup.next_number(), SetupKind.DOUBLED, str(state.tube), values, 1.0, GROUND_STATION, utc)
+        with refusing_disk():
+            self.store.keep_told(entry)
+        setup.add([entry])
 
     def _keep_arrived(self) -> None:
         """Store and learn what came together before any of it is acknowledged."""

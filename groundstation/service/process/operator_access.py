@@ -41,7 +41,7 @@ ANSWERED_WITHIN = 900.0  # s, own clock, after which an order that no tube has a
 NO_KEY = "key_file: expected the key file of the rig, without it no node takes a block"
 LONGEST_NAME = 64  # characters, of who orders
 UPLOAD = "upload_parameters"
-SETUP_COMMANDS = ("north", "collar", "joint", "length", "stick_up", "setup")
+SETUP_COMMANDS = ("north", "collar", "joint", "length", "stick_up", "same_number", "setup")
 RECALIBRATION = "recalibration"  # who orders what the calibration in the field asks for
 
 
