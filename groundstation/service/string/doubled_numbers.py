@@ -1,7 +1,7 @@
 """Two tubes that give themselves one number: found by their places in the string, and told apart by them. No I/O.
 
-Each state names how far its tube is from the encoder. One tube changes that once, when another is added above it; two of
-one number contradict each other with every state. Which of both a message is of is told by its place and its time.
+Each state names how far its tube is from the encoder. One tube changes that once, when another is added above it; two
+of one number contradict each other with every state. Which of both a message is of is told by its place and its time.
 """
 
 from __future__ import annotations
