@@ -64,6 +64,7 @@ KINDS: tuple[AlarmKind, ...] = (
     AlarmKind("tube_disk", DEGRADED, "a tube cannot save its state; a cut now loses what came since"),
     AlarmKind("tube_queue", NOTICE, "a queue of a tube was full and dropped something"),
     AlarmKind("clock", BAD, "a tube's rig time is ahead of the ground station's, or of another epoch"),
+    AlarmKind("clock_back", NOTICE, "clock or date of the ground station's machine stepped back, as of a restored one"),
     AlarmKind("epoch", NOTICE, "the encoder has started again: rig time counts anew"),
     AlarmKind(
         "reference",
