@@ -27,7 +27,7 @@ LATE = 2.0  # s that the ground station may take to notice a silence, or that a 
 TOLD = frozenset(
     {
         *("survey_missing", "numbers_lost", "numbers_missing", "survey_set_aside", "survey_unplaced"),
-        *("disk", "depth_silent", "depth_refused"),
+        *("disk", "depth_silent", "depth_refused", "same_number"),
     }
 )
 DEPTH = frozenset({"depth_refused", "depth_contradicts"})  # alarms while which no depth since a gap is sure
