@@ -11,6 +11,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from groundstation.entry.bounded_text import bounded_text
 from groundstation.entry.entry_warning import EntryWarning
 from groundstation.entry.station_plausibility import design_warnings
 from groundstation.errors import SurveyError
@@ -181,7 +182,7 @@ def _read_plan_stations(path: Path) -> PlanSettings:
 
 def _read_legs(path: Path) -> PlanSettings:
     try:
-        return PlanSettings(**parse_toml_tables(path.read_text("utf-8")))
+        return PlanSettings(**parse_toml_tables(bounded_text(path)))
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise SurveyError(f"{path}: {reason}; expected a plan") from error

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.bounded_text import LARGEST_FILE
 from groundstation.entry.null_values import is_null
 from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
-LARGEST_FILE = 64 * 2**20  # bytes of a record of a laboratory
 LARGEST = 1e30  # of a reading; no sensor reaches it, and its square is still a number
 
 

@@ -6,6 +6,7 @@ Lengths in m; positions against the site's zero: north, east, down.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -23,6 +24,7 @@ from groundstation.survey.well.trajectory_rows import TrajectoryPoint
 
 Array = npt.NDArray[np.float64]
 CONFIDENCE = 0.95
+CHECKED = "nothing is missing, and nothing is beyond what steel does"
 CONTAINED = "errors of the instrument and of setting out; no mistakes"
 CLAUSES = {
     "en-12716": "EN 12716, execution of jet grouting: 50 mm at the head and 2 % of the length drilled",
@@ -77,6 +79,8 @@ class ColumnRecord:
     surveyed_md: float  # nan where it was not surveyed
     drilled_md: float  # nan where it was not drilled
     actions: Sequence[str] = ()  # what is to be done about it
+    times: tuple[str, str] | None = None  # of its first and last survey, as its table tells them
+    warnings: Sequence[str] = ()  # of its data
 
     def deviations(self) -> list[Deviation]:
         """Deviations from the design at every surveyed station."""
@@ -92,6 +96,7 @@ def column_report(record: ColumnRecord, site: ReportSite, origin: Origin) -> Doc
     """Report of one column."""
     found = record.deviations() if math.isfinite(record.surveyed_md) else []
     verdict, good = _verdict(record, found)
+    good = good and not record.warnings
     sections = [
         ReportSection("Setting out and design", facts=_design_facts(record, site)),
         ReportSection("As built against design", (_tolerance_words(record.design),), **_table(record, found, site)),  # type: ignore[arg-type]
@@ -180,7 +185,21 @@ def instrument_facts(record: ColumnRecord) -> list[tuple[str, str]]:
 def paper_facts(record: ColumnRecord) -> list[tuple[str, str]]:
     """What the first page says of the instrument and of the ±."""
     told = " / ".join(text or NOT_STATED for text in (record.serial, record.calibration))
-    return [("Serial and calibration of the instruments", told), ("What the ± contains", CONTAINED)]
+    return [
+        ("Times of the surveys", times_words(record)),
+        ("Serial and calibration of the instruments", told),
+        ("Check of the data", f"warnings: {len(record.warnings)}" if record.warnings else CHECKED),
+        ("What the ± contains", CONTAINED),
+    ]
+
+
+def times_words(record: ColumnRecord) -> str:
+    """When a column was surveyed: seconds of its record, or days and hours as they are told."""
+    if record.times is None:
+        return NOT_STATED
+    first, last = record.times
+    are_seconds = all(re.fullmatch(r"[0-9.e+]+", text) for text in record.times)
+    return f"{first} to {last} s of its record" if are_seconds else f"{first}, {last}"
 
 
 def _table(record: ColumnRecord, found: Sequence[Deviation], site: ReportSite) -> dict[str, object]:

@@ -8,7 +8,7 @@ from datetime import date
 import numpy as np
 
 from groundstation.errors import SurveyError
-from groundstation.report.column_report import ColumnRecord, ReportSite, column_report, tolerance_text
+from groundstation.report.column_report import CHECKED, ColumnRecord, ReportSite, column_report, tolerance_text
 from groundstation.report.document import (
     AS_BUILT,
     Document,
@@ -73,7 +73,8 @@ def _record(wall: Wall, judgement: Judgement, k: int) -> ColumnRecord:
         plan.design, state_words(plan, built, k), plan.tool, plan.serial, plan.calibration, plan.head_std, hole.md,
         hole.inclination, hole.azimuth, np.array(plan.design.head) + places, covs,
         float(built.surveyed[k]) if built.surveyed[k] > 0.0 else math.nan,
-        float(built.ends[k]) if math.isfinite(built.ends[k]) else math.nan, actions,
+        float(built.ends[k]) if math.isfinite(built.ends[k]) else math.nan, actions, hole.times,
+        [warning.text for warning in wall.warnings if warning.what == name],
     )  # fmt: skip
 
 
@@ -126,6 +127,7 @@ def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
             f"{whole.probability:.2g} (standard error {whole.standard_error:.1g}), allowed {file.allowed:g}",
         ),
         ("Site", site_text(wall)),
+        ("Times of the surveys", times_words(records)),
         ("Serial and calibration of the instruments", stated_words(records)),
         ("Check of the data", check_words(wall)),
         ("What the ± contains", CONTAINED),
@@ -162,17 +164,25 @@ def site_text(wall: Wall) -> str:
 
 def stated_words(records: list[ColumnRecord]) -> str:
     """Of how many surveyed columns the instrument is told, so that the first page says where it is not."""
-    surveyed = [record for record in records if math.isfinite(record.surveyed_md)]
-    told = sum(bool(record.serial and record.calibration) for record in surveyed)
-    if told == len(surveyed):
+    return _count_words([bool(r.serial and r.calibration) for r in records if math.isfinite(r.surveyed_md)])
+
+
+def times_words(records: list[ColumnRecord]) -> str:
+    """Of how many surveyed columns the times of the surveys are told; the report of each has them."""
+    return _count_words([record.times is not None for record in records if math.isfinite(record.surveyed_md)])
+
+
+def _count_words(flags: list[bool]) -> str:
+    told = sum(flags)
+    if told == len(flags) and flags:
         return f"stated of all {told} columns that were surveyed"
-    return f"stated of {told} of {len(surveyed)} columns that were surveyed" if told else NOT_STATED
+    return f"stated of {told} of {len(flags)} columns that were surveyed" if told else NOT_STATED
 
 
 def check_words(wall: Wall) -> str:
     """How many values are missing, or hardly can be; each is a reason below."""
     count = len(wall.warnings)
-    return f"warnings: {count}" if count else "nothing is missing, and nothing is beyond what steel does"
+    return f"warnings: {count}" if count else CHECKED
 
 
 def tight_words(wall: Wall) -> str:

@@ -36,6 +36,21 @@ def test_wall_and_hole_come_as_pdf_and_another_is_refused_meanwhile(rig: Rig) ->
             assert (answer.status, answer.headers["content-type"]) == (200, "application/pdf")
             assert answer.headers["content-disposition"] == f'attachment; filename="H2-{subject}.pdf"'
             assert answer.body.startswith(b"%PDF")
+        plain, italian, same = (
+            page.get(f"/api/reports/hole.pdf{words}").body
+            for words in ("", "?language=it&document=D-17&revision=B&contractor=Bohr%20AG", "?language=en")
+        )
+        assert italian.startswith(b"%PDF")
+        assert (plain == same, plain == italian) == (True, False)
+        assert b"/Lang(it)" in italian
+        for words, told in (
+            ("language=xx", "parameter language: expected one of de, en, es, fr, it, got 'xx'"),
+            ("depth=3", "parameter depth: expected one of language, document, revision, contractor"),
+            (f"document={'9' * 81}", "parameter document: expected one line of at most 80 characters"),
+            ("document=%0a", "parameter document: expected one line"),
+        ):
+            refused = page.get(f"/api/reports/wall.pdf?{words}")
+            assert (refused.status, told in refused.content["error"]) == (400, True)
         unknown = page.get("/api/reports/string.pdf")
         assert (unknown.status, unknown.content["error"]) == (404, "report: expected wall or hole, got 'string'")
     rig.ground.close()

@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -152,6 +153,23 @@ def test_the_first_page_says_what_is_not_stated_and_what_the_sigma_holds(made: A
     assert "no mistakes" in wall["What the ± contains"]
     assert hole["Times of the surveys"] == "10 to 580 s of its record"
     assert hole["Site"].startswith("gravity 9.81000 m/s^2 (default); latitude 52 deg")
+
+
+def test_a_column_says_when_it_was_surveyed_and_what_of_its_data_hardly_can_be(tmp_path: Path) -> None:
+    path = write_wall(tmp_path)
+    table = (tmp_path / "stations.csv").read_text().splitlines()
+    timed = [table[0] + ",time_s", *(f"{line},{100 + 7 * k}" for k, line in enumerate(table[1:]))]
+    (tmp_path / "stations.csv").write_text("\n".join(timed) + "\n")
+    wall = read_wall(path)
+    records = column_records(wall, judge_wall(wall))
+    facts = dict(column_report(records[0], site_of(wall), origin_in("en")).facts)
+    assert re.fullmatch(r"100 to \d+ s of its record", facts["Times of the surveys"])
+    assert facts["Check of the data"] == "nothing is missing, and nothing is beyond what steel does"
+    good = column_report(records[0], site_of(wall), origin_in("en"))
+    doubted = column_report(replace(records[0], warnings=("a spike",)), site_of(wall), origin_in("en"))
+    assert (good.good, doubted.good, dict(doubted.facts)["Check of the data"]) == (True, False, "warnings: 1")
+    whole = dict(wall_report(wall, judge_wall(wall), origin_in("en")).facts)
+    assert whole["Times of the surveys"] == "stated of all 19 columns that were surveyed"
 
 
 def test_a_hole_has_a_report_of_its_own(made: Any) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from groundstation.gateway.page.exports import EXPORTED, MEDIA, PARAMETERS
 from groundstation.gateway.page.passwords import ROLES
-from groundstation.gateway.page.reports import SUBJECTS
+from groundstation.gateway.page.reports import PAPERS, SUBJECTS
 from groundstation.service.answers.answer_table import ANSWERS, AnswerKey
 from groundstation.service.answers.shapes.answer_fields import object_schema
 from telemetry.application.arguments import shown_name
@@ -98,8 +98,12 @@ def report_paths() -> View:
         f"/api/reports/{subject}.pdf": {
             "get": {
                 "operationId": f"report_{subject}",
+                "parameters": [
+                    {"name": name, "in": "query", "schema": {"type": "string"}, "description": told}
+                    for name, told in PAPERS.items()
+                ],
                 "responses": {"200": {"description": f"what is known of the {subject} now", "content": pdf}}
-                | error_responses(401, 404, 409, 501, 503),
+                | error_responses(400, 401, 404, 409, 501, 503),
             }
         }
         for subject in SUBJECTS

@@ -98,7 +98,7 @@ class PageHandlers:
     async def report(self, request: Request) -> Response:
         """``GET /api/reports/wall.pdf`` and ``hole.pdf``: a report to be signed."""
         self._check_reader(request)
-        name, made = await self._reporter.pdf(request.path_params["subject"])
+        name, made = await self._reporter.pdf(request.path_params["subject"], dict(request.query_params))
         return Response(made, media_type="application/pdf", headers=saved_as(name))
 
     async def export(self, request: Request) -> Response:

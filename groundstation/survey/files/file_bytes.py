@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from groundstation.entry.bounded_text import LARGEST_FILE
 from groundstation.errors import SurveyError
 
-LARGEST_FILE = 64 * 2**20  # bytes; a survey of a million stations has less
 MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.entry.bounded_text import bounded_text
 from groundstation.entry.null_values import is_null
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import load_tool
@@ -93,7 +94,7 @@ def _covariance(path: Path, data: dict[str, Any]) -> Any:
 
 def _toml(path: Path, what: str) -> dict[str, Any]:
     try:
-        return parse_toml_tables(path.read_text("utf-8"))
+        return parse_toml_tables(bounded_text(path))
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise SurveyError(f"{path}: {reason}; expected {what}") from error

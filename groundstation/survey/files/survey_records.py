@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.bounded_text import bounded_text
 from groundstation.entry.null_values import is_null
 from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
@@ -110,7 +111,7 @@ def read_columns(
 
 def _lines(path: Path, names: tuple[str, ...]) -> list[tuple[int, str]]:
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = bounded_text(path, "utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise SurveyError(f"{path}: {reason}; expected a CSV file with {', '.join(names)}") from error

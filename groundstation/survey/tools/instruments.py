@@ -17,6 +17,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from groundstation.entry.bounded_text import bounded_text
 from groundstation.errors import ToolError
 from groundstation.survey.tools.formulas import (
     CONSTANTS,
@@ -179,7 +180,7 @@ def _read_tool(name_or_file: str, parameters: Mapping[str, float] | None) -> Sur
             "or a .toml or .json file"
         )
     try:
-        text = path.read_text("utf-8")
+        text = bounded_text(path)
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise ToolError(

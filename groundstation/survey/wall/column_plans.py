@@ -60,6 +60,7 @@ class ColumnSurvey:
     record: dict[str, Array] = field(default_factory=dict)
     covs: Array | None = None
     warnings: tuple[EntryWarning, ...] = ()  # of values that are missing
+    times: tuple[str, str] | None = None  # of the first and the last survey, as the table tells them
 
     def turned(self, angle: float) -> ColumnSurvey:
         """Return the survey counted from another north, from which its own has the azimuth ``angle`` (rad)."""

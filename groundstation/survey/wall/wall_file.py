@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.bounded_text import bounded_text
 from groundstation.entry.entry_warning import EntryWarning
 from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
@@ -184,7 +185,7 @@ def read_wall_file(path: Path) -> WallFile:
         One line: file, key, what was expected and what came.
     """
     try:
-        data = parse_toml_tables(path.read_text("utf-8"))
+        data = parse_toml_tables(bounded_text(path))
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise SurveyError(f"{path}: {reason}; expected a wall file") from error

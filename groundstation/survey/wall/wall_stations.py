@@ -75,6 +75,7 @@ def read_holes(path: Path, plans: Sequence[ColumnPlan], heights: list[float]) ->
             np.radians(azi[part]),
             *_told(path, plan, line[part], {name: values[part].tolist() for name, values in cells.items()}),
             tuple(warning for warning in missing if warning.what == plan.design.name),
+            _times(cells["time_s"][part].tolist() if "time_s" in cells else []),
         )
         for plan, part in zip(plans, parts, strict=True)
     ]
@@ -96,6 +97,12 @@ def _without_missing(
         warnings.append(EntryWarning("missing", name, text, at, at))
     kept = np.flatnonzero(~gone.any(axis=0))
     return {name: values[kept] for name, values in table.items()}, [lines[k] for k in kept], warnings
+
+
+def _times(cells: list[str]) -> tuple[str, str] | None:
+    """First and last time of a column's surveys, as they are told."""
+    told = [cell for cell in cells if cell]
+    return (told[0], told[-1]) if told else None
 
 
 def _told(

@@ -1,17 +1,26 @@
 """One reader: the same well in every format of the field is the same answer; what is damaged or hostile is refused."""
 
+import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from same_well import FORMATS, ROWS, ags, bomb, csv_text, diggs, las_2, las_3, witsml_1, witsml_2, xlsx
 
+from groundstation.calibration.calibration_records import read_turn_table
+from groundstation.entry import bounded_text
 from groundstation.errors import SurveyError
-from groundstation.survey.files import file_bytes
+from groundstation.plan_settings import read_plan
 from groundstation.survey.files.field_files import read_any
 from groundstation.survey.files.field_table import TableWish
+from groundstation.survey.files.programme import read_programme, read_tie_on
+from groundstation.survey.files.survey_records import read_record
 from groundstation.survey.requests.survey_answer import answer_survey
 from groundstation.survey.requests.survey_request import FrameRequest, SurveyRequest
+from groundstation.survey.tools.instruments import load_tool
+from groundstation.survey.wall.wall_file import read_wall
+from telemetry.errors import InputError
 
 
 def put(folder: Path, name: str, content: bytes | str) -> Path:
@@ -157,6 +166,29 @@ def test_entities_and_document_types_are_refused(tmp_path: Path, doctype: str, e
         read_any(put(tmp_path, "bomb.xml", witsml_2(doctype=doctype, md=entity)))
 
 
+@pytest.mark.parametrize(
+    ("name", "read"),
+    [
+        ("plan.toml", read_plan), ("wall.toml", read_wall), ("tie.toml", read_tie_on), ("legs.toml", read_programme),
+        ("s.csv", read_record), ("plan.csv", read_plan), ("table.csv", lambda path: read_turn_table(path, 1.0)),
+        ("tool.toml", lambda path: load_tool(str(path))),
+    ],
+)  # fmt: skip
+def test_settings_of_two_gigabytes_are_refused_before_they_are_read_whole(
+    tmp_path: Path, name: str, read: Callable[[Path], object]
+) -> None:
+    path = tmp_path / name
+    with path.open("wb") as file:
+        file.truncate(2 * 2**30)
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match="64 MiB"):
+            read(path)
+        assert tracemalloc.get_traced_memory()[1] < 300 * 2**20
+    finally:
+        tracemalloc.stop()
+
+
 def test_a_file_beyond_any_survey_is_refused_before_it_is_read_whole(tmp_path: Path) -> None:
     path = tmp_path / "large.csv"
     with path.open("wb") as file:
@@ -165,7 +197,7 @@ def test_a_file_beyond_any_survey_is_refused_before_it_is_read_whole(tmp_path: P
         read_any(path)
     with pytest.raises(SurveyError, match="a workbook of at most 256 MiB, got more"):
         read_any(put(tmp_path, "bomb.xlsx", bomb()))
-    assert file_bytes.LARGEST_FILE < 2 * 2**30
+    assert bounded_text.LARGEST_FILE < 2 * 2**30
 
 
 def test_a_wall_reads_what_a_survey_reads(tmp_path: Path) -> None:
