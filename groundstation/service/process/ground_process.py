@@ -31,7 +31,6 @@ from groundstation.service.string.doubled_numbers import NumberWatch
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seal_watch import SealWatch, refusal_of
 from telemetry.errors import DecodeError
-from telemetry.media.port import PortFrame
 from telemetry.messages import (
     BASE,
     EPOCH_UNKNOWN,
@@ -49,7 +48,7 @@ from telemetry.messages import (
 )
 from telemetry.presentation.msgpack_codec import decode_message
 from telemetry.runtime.disk import MACHINE, Disk
-from telemetry.runtime.process_interface import Process
+from telemetry.runtime.process_interface import OutgoingFrames, Process
 from telemetry.runtime.steady_time import SteadyTime
 from telemetry.transport.authentication import read_key
 from telemetry.unwritten import Content
@@ -218,7 +217,7 @@ class GroundProcess(Process):
         due = self._uploads.next_due() if self._uploads is not None else math.inf
         return self._steady.shown_at(min(super().next_wake(self._steady.follow(now)), due))
 
-    def take_frames(self, now: float) -> list[tuple[Side, PortFrame]]:
+    def take_frames(self, now: float) -> OutgoingFrames:
         """Frames to send now."""
         return super().take_frames(self._steady.follow(now))
 
