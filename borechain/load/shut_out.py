@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import datetime
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +77,7 @@ def drilling(endpoint: str, stick: Path, outcome: KillOutcome) -> Iterator[Hande
                 loop.call(lambda _process, now: crowd.happen(now))
                 outcome.handed += 1
 
-            crowd.hand_over = hand_over
+            crowd.one_more = hand_over
             first_receipt(crowd, hand_over)
             yield crowd
             wait_until(lambda: crowd.endpoint.mail.outbox_size == 0)
@@ -86,9 +86,7 @@ def drilling(endpoint: str, stick: Path, outcome: KillOutcome) -> Iterator[Hande
 class HandedCrowd(Crowd):
     """A string, and how it is given one thing more to hand over."""
 
-    @staticmethod
-    def hand_over() -> None:
-        """Hand one thing over; set once the string lives."""
+    one_more: Callable[[], None]  # hands one thing over; set once the string lives
 
 
 @contextlib.contextmanager
@@ -109,6 +107,6 @@ def time_until_out(hers: ZenohBus, his: ZenohBus, stick: Path, name: str, crowd:
     revoke_person(stick, name)
     wait_until(lambda: not is_answered(hers) and is_answered(his))
     out = time.monotonic() - begun
-    crowd.hand_over()
+    crowd.one_more()
     wait_until(lambda: crowd.receipted > before and crowd.endpoint.mail.outbox_size == 0)
     return out, time.monotonic() - begun
