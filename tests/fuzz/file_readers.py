@@ -47,7 +47,7 @@ LAS = b"""~Version
 XML = (
     b'<?xml version="1.0"?><trajectorys xmlns="http://www.witsml.org/schemas/1series" version="1.4.1.1"><trajectory>'
     b'<trajectoryStation uid="1"><md uom="m">0</md><incl uom="dega">0</incl><azi uom="dega">0</azi></trajectoryStation>'
-    b'<trajectoryStation uid="2"><md uom="m">3</md><incl uom="dega">1</incl><azi uom="dega">20</azi></trajectoryStation>'
+    b'<trajectoryStation uid="2"><md uom="m">3</md><incl uom="dega">1</incl><azi uom="dega">9</azi></trajectoryStation>'
     b"</trajectory></trajectorys>"
 )
 
