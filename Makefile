@@ -14,7 +14,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts bounds kernels kernels-of-floats kernels-of-integers bytecode browser fast tests planted mutation statistical truth explore lock study studies soak seeds clean wheel test-socketcan test-firmware test-compose
+.PHONY: help rig test quick check lint types contracts bounds kernels kernels-of-floats kernels-of-integers bytecode browser fast tests planted mutation fuzz statistical truth explore lock study studies soak seeds clean wheel test-socketcan test-firmware test-compose
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-20s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -98,6 +98,9 @@ planted: kernels  ## plant every listed defect, one at a time, and see whether t
 mutation: kernels  ## change an operator or a number of the pure modules, a sample by a seed, and see whether the tests notice
 	nice -n 10 $(BIN)/python tests/planted/run_mutants.py $(MUTATE)
 
+fuzz: $(STAMP)  ## changed files of every kind that is read, a minute each; FUZZ="tables --seconds 600": some, longer
+	nice -n 10 $(BIN)/python tests/fuzz/run_fuzz.py $(FUZZ)
+
 explore: $(STAMP)  ## the properties with examples that no run before has seen
 	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest -m hypothesis
 
@@ -106,6 +109,7 @@ study: $(STAMP)  ## statistical tests, and every study with many seeds: its tabl
 	$(BIN)/borechain bench realtime --nodes 50 --seconds 120 --out docs/results
 	$(BIN)/python -P benchmarks/codec.py
 	nice -n 10 $(BIN)/python tests/planted/run_planted.py --sample 40
+	nice -n 10 $(BIN)/python tests/fuzz/run_fuzz.py --seconds 60
 	$(BIN)/python docs/make_faults.py
 
 # what the tests leave of the cores, the studies use; they are in no test's way

@@ -116,15 +116,15 @@ async def test_a_selector_that_covers_everything_orders_nothing_and_ends_nobody(
     assert it.ground.endpoint.counters["failed_queries"] == 0
 
 
-@pytest.mark.parametrize("rigs", ["*", "**", "rig-*", "$*"])
+@pytest.mark.parametrize("rigs", ["*", "**", "rig-$*"])
 async def test_an_order_to_every_rig_is_refused_in_a_line_and_obeyed_by_none(
     rig: tuple[Rig, ZenohBus], rigs: str
 ) -> None:
     it, bus = rig
     selector = f"borechain/{rigs}/cmd/accept_joints?action=confirm"
-    replies = await asyncio.to_thread(bus.get, selector.replace("rig-*", "rig-$*"), 10.0)
-    assert all("expected one rig and one order" in str(reply.error) for reply in replies)
-    assert len(replies) == (0 if rigs == "**" else 1)  # whose third part may be anything
+    replies = await asyncio.to_thread(bus.get, selector, 10.0)
+    assert all(reply.error and "\n" not in reply.error for reply in replies)
+    assert any("expected one rig and one order" in str(reply.error) for reply in replies)
     assert (await ask(bus, f"{GROUND}/orders"))["orders"] == []
     assert not it.ground.operator.has_pending
 

@@ -22,6 +22,7 @@ OWN = {
     "day": "load",
     "learn": "load",
     "doors": "load",
+    "shut_out": "load",
     "killed": "load",
     "hour": "hour_command",
 }  # and the module of each
@@ -74,6 +75,7 @@ def bench(context: click.Context) -> None:
       borechain bench day --hours 24
       borechain bench learn
       borechain bench doors
+      borechain bench shut_out
       borechain bench killed --times 200
       borechain bench hour
     """

@@ -136,6 +136,33 @@ def doors(half_open: int, streams: int, wrong: int, asks: int, address: str, end
 
 @click.command()
 @click.option(
+    "--times", type=click.IntRange(1, 100), default=5, show_default=True, help="Persons, one after the other."
+)
+@click.option("--endpoint", default="tls/127.0.0.1:7447", show_default=True, help="Where its router listens, TLS.")
+@json_option
+@require_modules("cryptography", "scipy", "sqlalchemy")
+@plain_faults
+def shut_out(times: int, endpoint: str, as_json: bool) -> None:
+    """Revoke persons in mid-drill, and measure after how long each is out and that nothing of the string is lost.
+
+    \b
+    Example:
+      borechain bench shut_out --times 5
+    """
+    from borechain.load.shut_out import measure_shut_out
+
+    with tempfile.TemporaryDirectory(prefix="borechain-") as folder:
+        result: dict[str, Any] = {"bench": "shut_out"} | measure_shut_out(times, endpoint, Path(folder))
+    if as_json:
+        click.echo(json.dumps(result))
+        return
+    out, goes_on = (max(result[name]) for name in ("out_s", "goes_on_s"))
+    click.echo(f"{times} persons revoked: out within {out:.1f} s, the string receipted again within {goes_on:.1f} s")
+    click.echo(f"{result['handed']} handed over, {result['lost']} lost, {result['doubled']} kept twice")
+
+
+@click.command()
+@click.option(
     "--surveys", type=click.IntRange(500, 1_000_000), default=10_000, show_default=True, help="Stored before."
 )
 @click.option("--tubes", type=click.IntRange(2, 250), default=50, show_default=True, help="Surveyed at every stop.")

@@ -94,10 +94,9 @@ class SetupOrders:
             return self._check(order)
         kind, told = SetupKind(order.spec.name), order.arguments
         subject, number = self._subject_of(kind, order), self._book.next_number()
+        values, sigma = tuple(told[name] for name in VALUES[kind]), told.get("sigma", 1.0)
         if kind is SetupKind.SAME_NUMBER:
-            values, sigma = (float(str(told["which"]) == UPPER),), 1.0
-        else:
-            values, sigma = tuple(told[name] for name in VALUES[kind]), told["sigma"]
+            values = tuple(float(str(which) == UPPER) for which in values)
         entry = ToldValue(number, kind, subject, values, sigma, order.by, order.utc, told.get("used"))
         before = self._book.standing(kind, subject)
         detail = self._enter(entry)
@@ -120,7 +119,7 @@ class SetupOrders:
     def _subject_of(self, kind: SetupKind, order: SetupOrder) -> str:
         if kind is SetupKind.JOINT:
             return joint_subject(*self._checked_joint(order))
-        if kind is SetupKind.SAME_NUMBER and order.tube not in self._book.doubled:
+        if kind is SetupKind.SAME_NUMBER and (order.tube or 0) not in self._book.doubled:
             raise SelectorError(f"same_number: tube {order.tube}: expected a number that two tubes give themselves")
         return str(order.tube) if kind in OF_TUBES else ""
 
