@@ -20,7 +20,7 @@ help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-20s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 rig:  ## set up, with a bar, and drill wellbore 1
-	@$(MAKE) --question $(STAMP) 2> /dev/null || $(PYTHON) deploy/set_up_shown.py $(VENV) $(MAKE) $(STAMP)
+	@$(MAKE) --no-print-directory --question $(STAMP) > /dev/null 2>&1 || $(PYTHON) deploy/set_up_shown.py $(VENV) $(MAKE) $(STAMP)
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
 
 test:  ## set up and run every check and every test, in parallel

@@ -12,12 +12,18 @@ from pathlib import Path
 import pytest
 from chip_tools import compile_replay, layout_of_one, needs, needs_gcc, run_program, said_numbers
 from chip_worlds import every_world, rough_node
+from drawn_calls import record_drawn_calls
 from recorded_calls import record_calls
 
 from node.translation.c_file import CODE, HEADER, CFiles, write_c_files
 from node.translation.imu_limit import write_for_imus
 
 CHECKED = ("-fno-wrapv", "-fsanitize=undefined,bounds-strict,address", "-fno-sanitize-recover=all")
+
+TRAPPED = (
+    "-DTRAPPED", "-D_POSIX_C_SOURCE=200809L", "-fno-wrapv", "-fsanitize=undefined,bounds-strict",
+    "-fsanitize-undefined-trap-on-error",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +56,18 @@ def test_every_call_is_equal_bit_for_bit(built: Path, calls: Path) -> None:
     found = said_numbers(done.stdout)
     assert (done.returncode, found["wrong"]) == (0, 0), done.stdout
     assert found["calls"] > 12_000
+
+
+@needs_gcc
+@pytest.mark.slow
+def test_calls_from_records_that_no_world_leads_to_are_equal(built: Path, tmp_path: Path) -> None:
+    """But for one in a hundred that neither language gives a meaning to: a product beyond 64 bits and the like."""
+    worlds = (rough_node(2, 3, 2, 150), rough_node(6, 1, 0, 150), rough_node(8, 2, 2, 150))
+    made = record_drawn_calls(tmp_path / "calls.bin", 1, 8, *worlds)
+    done = run_program(compile_replay(built, *TRAPPED, name="trapped"), tmp_path / "calls.bin", folder=built)
+    found = said_numbers(done.stdout)
+    assert (found["calls"], found["wrong"], done.returncode) == (made, 0, 0), done.stdout
+    assert found["undefined"] < made / 100
 
 
 @needs_gcc

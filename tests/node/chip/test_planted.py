@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from chip_tools import compile_replay, needs, needs_gcc, run_program
 from chip_worlds import every_world, smoothed_strings
+from drawn_calls import record_drawn_calls
 from recorded_calls import record_calls
 
 from node.translation.c_file import CODE, HEADER, write_c_files
@@ -80,19 +81,33 @@ def test_the_calls_run_the_blocks_of_the_code(calls: Path, tmp_path: Path) -> No
     assert branches >= 95.0
 
 
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("drawn") / "calls.bin"
+    record_drawn_calls(path, 1, 5, *every_world(150))
+    return path
+
+
 @needs_gcc
 @pytest.mark.statistical
 @pytest.mark.timeout(1800)
-def test_two_of_three_planted_defects_are_noticed(calls: Path, tmp_path: Path) -> None:
-    """135 of 200 so far: most that are not shift a bound by one count. The aim is 180."""
+def test_three_of_four_planted_defects_are_noticed(calls: Path, drawn: Path, tmp_path: Path) -> None:
+    """NOTICED of 200 so far, 133 of them by the calls of worlds: most that are not shift a bound by one count.
+
+    The aim is 180. Of the drawn calls some have no meaning in either language, so what is said is compared.
+    """
     written = write_c_files()
     code, _ = plant_switches(written.code, np.random.default_rng(54))
     (tmp_path / HEADER).write_text(written.header)
     (tmp_path / CODE).write_text(code.replace(f'#include "{HEADER}"', f'#include "{HEADER}"{SWITCH}', 1))
     program = compile_replay(tmp_path, "-w")
-    noticed = [
-        run_program("timeout", "20", program, calls, folder=tmp_path, environment={"PLANTED": str(k)}).returncode != 0
-        for k in range(PLANTED + 1)
-    ]
-    assert not noticed[0]
-    assert sum(noticed) >= 130, [k for k, seen in enumerate(noticed) if not seen]
+
+    def said(which: int, path: Path) -> str:
+        environment = {"PLANTED": str(which)}
+        done = run_program("timeout", "30", program, path, folder=tmp_path, environment=environment)
+        return f"{done.returncode} {done.stdout}"
+
+    plain = {path: said(0, path) for path in (calls, drawn)}
+    assert plain[calls].startswith("0 ")
+    noticed = [any(said(k, path) != plain[path] for path in (calls, drawn)) for k in range(1, PLANTED + 1)]
+    assert sum(noticed) >= 145, [k for k, seen in enumerate(noticed, 1) if not seen]
