@@ -36,6 +36,7 @@ from groundstation.service.hole.deviation_alarms import AlarmList, DeviationAlar
 from groundstation.service.hole.history import History
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
+from groundstation.service.orders import surveyed_biases as biases_room
 from groundstation.service.orders.order_book import OrderBook, OrderState, SentOrder
 from groundstation.service.orders.recalibration.solution import propose_bias
 from groundstation.service.orders.uploads import Uploads
@@ -538,3 +539,15 @@ def test_a_stop_is_revised_by_a_later_message_alone(later: int, counts: bool) ->
         assert station.revise_stop(0, again, 0) == counts
         assert (station.stops[0].yaw == 2.0) == counts
         again.rows["sequence"] += int(counts)
+
+
+def test_what_tubes_say_of_a_station_before_and_after_it_moved_is_of_two_stations() -> None:
+    collar, station = SurveyStation(0.0, ResolvedStops()), SurveyStation(2.0, ResolvedStops())
+    for number in range(4):
+        one = stops_of(1, 2 * number, 10.0 * number)
+        one.rows["trust"] = Trust.FULL if number != 2 else Trust.UNKNOWN_YAW
+        collar.add_stop(one, 0)
+        station.add_stop(one, 0)
+    station.drops = [1]
+    hole: Any = SimpleNamespace(stations=[collar, station])
+    assert [look.station for look in biases_room._looks_of_hole(hole, 9.81)] == [(2.0, 0), (2.0, 1), (2.0, 1)]
