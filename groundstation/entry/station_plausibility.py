@@ -24,10 +24,7 @@ LARGEST_RADIUS = 3.0  # m, of a column
 
 def station_warnings(md: Array, inclination: Array, azimuth: Array, what: str) -> tuple[EntryWarning, ...]:
     """Warnings of stations (n,); m and rad."""
-    bends = _angles(inclination, azimuth, 1)
-    sharp = bends > READING + SHARPEST * np.diff(md)
-    across = _angles(inclination, azimuth, 2)
-    alone = np.minimum(bends[:-1], bends[1:]) > APART + ALONE * across
+    bends, across, sharp, alone = _departures(md, inclination, azimuth)
     found = [
         EntryWarning(
             "spike", what,
@@ -49,6 +46,22 @@ def station_warnings(md: Array, inclination: Array, azimuth: Array, what: str) -
         )
         found.append(EntryWarning("dogleg", what, text, float(md[k]), float(md[k + 1])))
     return tuple(found)
+
+
+def departing_holes(md: Array, inclination: Array, azimuth: Array, hole: npt.NDArray[np.intp]) -> set[int]:
+    """Holes that have a warning of `station_warnings`; of stations (n,) of many, one hole after the other."""
+    _, _, sharp, alone = _departures(md, inclination, azimuth)
+    same = hole[1:] == hole[:-1]
+    return {*hole[1:][sharp & same].tolist(), *hole[1:-1][alone & same[1:] & same[:-1]].tolist()}
+
+
+def _departures(
+    md: Array, inclination: Array, azimuth: Array
+) -> tuple[Array, Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """Angles between neighbours (n - 1,) and across each (n - 2,), rad; which legs are sharp, which stations alone."""
+    bends, across = _angles(inclination, azimuth, 1), _angles(inclination, azimuth, 2)
+    sharp = bends > READING + SHARPEST * np.diff(md)
+    return bends, across, sharp, np.minimum(bends[:-1], bends[1:]) > APART + ALONE * across
 
 
 def _angles(inclination: Array, azimuth: Array, apart: int) -> Array:
