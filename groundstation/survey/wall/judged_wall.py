@@ -10,7 +10,7 @@ import numpy.typing as npt
 from groundstation.errors import SurveyError
 from groundstation.survey.wall.wall_file import Wall
 from groundstation.survey.wall.wall_joints import Detour
-from groundstation.survey.wall.wall_plausibility import touching_findings
+from groundstation.survey.wall.wall_plausibility import touching_findings, wall_warnings
 from groundstation.survey.wall.wall_verdict import DIAGONAL, Judgement, judge_columns
 
 
@@ -52,13 +52,15 @@ def part_around(wall: Wall, own: int) -> tuple[Wall, int]:
         members |= set(np.flatnonzero(away <= 2.0 * DIAGONAL * wall.grid_spacing).tolist())
     kept = sorted(members)
     new = {k: place for place, k in enumerate(kept)}
+    plans, holes = [wall.plans[k] for k in kept], [wall.holes[k] for k in kept]
+    pairs = _renumbered(wall.pairs[joints], new)
     part = replace(
         wall,
-        plans=[wall.plans[k] for k in kept],
-        holes=[wall.holes[k] for k in kept],
+        plans=plans,
+        holes=holes,
         drilled_on=[wall.drilled_on[k] for k in kept],
-        warnings=(),  # those of the part are found where it is judged
-        pairs=_renumbered(wall.pairs[joints], new),
+        warnings=wall_warnings(plans, holes, pairs),
+        pairs=pairs,
         detours=[Detour(joints.index(detour.joint), _renumbered(detour.pairs, new)) for detour in detours],
     )
     return part, new[own]
