@@ -52,13 +52,15 @@ def part_around(wall: Wall, own: int) -> tuple[Wall, int]:
         members |= set(np.flatnonzero(away <= 2.0 * DIAGONAL * wall.grid_spacing).tolist())
     kept = sorted(members)
     new = {k: place for place, k in enumerate(kept)}
+    plans, holes = [wall.plans[k] for k in kept], [wall.holes[k] for k in kept]
+    pairs = _renumbered(wall.pairs[joints], new)
     part = replace(
         wall,
-        plans=[wall.plans[k] for k in kept],
-        holes=[wall.holes[k] for k in kept],
+        plans=plans,
+        holes=holes,
         drilled_on=[wall.drilled_on[k] for k in kept],
-        warnings=tuple(w for w in wall.warnings if _is_of(w.what, [wall.plans[k].design.name for k in kept])),
-        pairs=_renumbered(wall.pairs[joints], new),
+        warnings=tuple(w for w in wall.warnings if _is_of(w.what, [plan.design.name for plan in plans])),
+        pairs=pairs,
         detours=[Detour(joints.index(detour.joint), _renumbered(detour.pairs, new)) for detour in detours],
     )
     return part, new[own]

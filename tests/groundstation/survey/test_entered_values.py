@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 from borechain import api
 from groundstation.calibration.calibration_records import read_turn_table
+from groundstation.config import checked_config
 from groundstation.entry.null_values import is_null, null_or_number
 from groundstation.entry.station_plausibility import station_warnings
-from groundstation.errors import SurveyError
+from groundstation.errors import ConfigurationError, SurveyError
 from groundstation.survey.requests.clearance_answer import answer_clearance
 from groundstation.survey.requests.clearance_request import ClearanceRequest
 from groundstation.survey.requests.survey_answer import answer_survey
@@ -289,7 +290,7 @@ def test_a_head_whose_value_is_none_is_refused(tmp_path: Path, key: str, cell: s
 @pytest.mark.parametrize(
     ("line", "most"),
     [
-        ("tight_to_m = 1e30", 100_000), ("tight_from_m = 1e30", 100_000), ("depth_step_m = 9999", 10),
+        ("tight_to_m = 1e30", 100_000), ("tight_from_m = 1e30", 100_000), ("depth_step_m = 9999", 2),
         ("head_sigma_m = 1e30", 100_000), ("northing_m = 1e30\neasting_m = 0\nheight_m = 0", 1e8),
     ],
 )  # fmt: skip
@@ -323,6 +324,23 @@ def test_a_tie_on_of_no_values_is_refused(tmp_path: Path, text: str, named: str)
     with pytest.raises(SurveyError) as error:
         answer(tmp_path, f"{HEAD}0,0,0\n10,2,40\n", tie_on=tie)
     assert named in str(error.value)
+
+
+@pytest.mark.parametrize("value", [-999.25, 9999.0, 1e30, math.nan, math.inf])
+@pytest.mark.parametrize(
+    "key",
+    [
+        "tube_length", "tube_length_std", "gravity", "north_deg", "north_std_deg", "collar_azimuth_deg",
+        "collar_inclination_deg", "collar_std_deg", "mount_tilt_std_deg", "mount_std_deg", "play_std_deg",
+        "design_azimuth_deg", "design_inclination_deg", "column_radius", "steering_deg_per_m", "stick_up_m",
+        "accelerometer_bias_std_deg", "north_check_deg",
+    ],
+)  # fmt: skip
+def test_a_setting_of_a_ground_station_beyond_its_range_is_refused(tmp_path: Path, key: str, value: float) -> None:
+    with pytest.raises(ConfigurationError, match=key):
+        checked_config(folder=tmp_path, **{key: value})
+    with pytest.raises(ConfigurationError, match="column_radius"):
+        checked_config(folder=tmp_path, column_radius=60.0)
 
 
 def test_a_place_is_in_radians() -> None:
