@@ -19,7 +19,7 @@ from sim.gauntlet.fault import EVERYBODY, Step
 from sim.gauntlet.faulty_channel import FaultyChannel
 from sim.gauntlet.faulty_disk import FaultyDisk, PowerCutError
 from sim.gauntlet.faulty_stepper import FaultyStepper
-from sim.gauntlet.faulty_world import DRILLED_IN, MINUTE, TUBE_LENGTH, FaultyWorld
+from sim.gauntlet.faulty_world import CALM_S, CALMED, DRILLED_IN, MINUTE, TUBE_LENGTH, FaultyWorld
 from sim.rig.scheduler import Scheduler
 from sim.world.random_streams import RandomStream, random_stream
 from telemetry.messages import BASE, Side
@@ -38,16 +38,19 @@ class Plan(NamedTuple):
     rested : s that pass before everything loses its power and the run begins, which is not judged; 0 for none
     after_begin : s of the run in which no fault begins
     settings : of the ground station
+    calm : s before the end, at which everything is repaired and after which all is to be well
     """
 
     tables: dict[str, Any]
     rested: float
     after_begin: float
     settings: dict[str, Any]
+    calm: float = 0.0
 
 
 PLANS = {
     "minute": Plan(MINUTE, RESTED, 6.0, {"tube_length": TUBE_LENGTH, "survey_after": 38.0}),
+    "calmed": Plan(CALMED, RESTED, 6.0, {"tube_length": TUBE_LENGTH, "survey_after": 38.0}, CALM_S),
     "drilled-in": Plan(DRILLED_IN, 0.0, 15.0, {"tube_length": TUBE_LENGTH}),
 }
 
@@ -166,14 +169,14 @@ class GauntletRig:
             return False  # a disk that refuses, or what it was told cannot be now
         return True
 
-    def drill(self, steps: Iterable[Step], observe: Callable[[], None] = lambda: None) -> None:
-        """Drill to the end with each step at its time; ``observe`` is called from time to time."""
+    def drill(self, steps: Iterable[Step], observe: Callable[[], None] = lambda: None, until: float = math.inf) -> None:
+        """Drill until a time (s), or to the end, with each step at its time; ``observe`` is called now and then."""
         for step in steps:
             self.advance(step.at, observe)
             step.act(self)
             for listener in self.after_step:
                 listener()
-        self.advance(math.inf, observe)
+        self.advance(until, observe)
 
     def repair(self) -> None:
         """Give everything power and a working disk, and have the crew accept the depth."""
@@ -183,8 +186,15 @@ class GauntletRig:
             self._disks[address].refusal, self._disks[address].writes_left = 0, -1
             self.thaw(address)
             self.start(address)
-        if self.ground is not None and self.ground.model.string.depths.jumped:
+        if self.ground is not None and self._depth_is_doubted(self.ground):
             self.inline.command("accept_depth", {"action": "confirm"})
+
+    @staticmethod
+    def _depth_is_doubted(ground: GroundProcess) -> bool:
+        """Whether a crew has to measure the depth of the bit and accept it."""
+        return bool(ground.model.string.depths.jumped) or any(
+            alarm.kind.code == "depth_refused" for alarm in ground.model.rig_alarms
+        )
 
     def close(self) -> None:
         """Close the database."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import shutil
 import tempfile
 import time
@@ -16,6 +17,7 @@ from borechain.drilling.rare_collection import rare_collection
 from borechain.gauntlet.fault_observability import FaultObservability
 from borechain.gauntlet.gauntlet_rig import PLANS, GauntletRig, make_ready, new_rig
 from borechain.gauntlet.oracles import Observer, find_violations
+from borechain.gauntlet.wellness import still_unwell
 from sim.gauntlet.fault_kinds import KINDS
 from sim.gauntlet.plan import drawn_kinds, steps_of
 from sim.rig.report import station_digest
@@ -96,11 +98,15 @@ def shrink_outcome(outcome: SeedOutcome) -> SeedOutcome:
 def _run(rig: GauntletRig, outcome: SeedOutcome) -> None:
     chosen, world = PLANS[outcome.plan], rig.world
     begin = world.begin + chosen.rested
-    steps = steps_of(outcome.seed, outcome.kinds, begin + chosen.after_begin, world.end)
+    until = world.end - chosen.calm
+    steps = steps_of(outcome.seed, outcome.kinds, begin + chosen.after_begin, until)
     outcome.schedule = [f"{step.at - begin:.1f} s {name}" for name, step in steps]
     is_of_few = len(outcome.kinds) <= FEW
     observer, sight = Observer(rig, steps[0][1].at, of_few=is_of_few), FaultObservability(rig)
-    rig.drill([step for _, step in steps], observer.look)
+    rig.drill([step for _, step in steps], observer.look, until if chosen.calm else math.inf)
+    if chosen.calm:
+        rig.repair()
+        rig.advance(math.inf, observer.look)
     outcome.told = observer.told
     if rig.ground is None:
         outcome.violations = ["the ground station is not there at the end"]
@@ -114,6 +120,7 @@ def _run(rig: GauntletRig, outcome: SeedOutcome) -> None:
     outcome.measurements = len(rig.inline.ask("measurements")["measurements"])
     outcome.violations = [
         *observer.found,
+        *(still_unwell(rig) if chosen.calm else ()),
         *find_violations(
             rig,
             observer.told,

@@ -49,7 +49,8 @@ def check_range(name: str, line: int, columns: list[str], values: Array, limit: 
 
 def line_error(name: str, line: int, expected: str, got: str) -> CalibrationError:
     """The error of one line."""
-    return CalibrationError(f"{name}, line {line}: expected {expected}, got {got}")
+    shown = "".join(one if one.isprintable() else "?" for one in got)
+    return CalibrationError(f"{name}, line {line}: expected {expected}, got {shown}")
 
 
 def read_bytes(path: Path) -> bytes:

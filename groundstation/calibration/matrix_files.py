@@ -37,7 +37,7 @@ def read_matrix(path: Path, unit: float = 1.0) -> Array:
     rows = given.get("matrix") if isinstance(given, dict) else None
     try:
         matrix = np.array(rows, dtype=np.float64)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError):
         matrix = np.zeros(0)
     if matrix.shape != (3, 3) or np.any(np.isinf(matrix)):
         raise CalibrationError(f"{path.name}: matrix: expected three rows of three numbers, got {rows}")

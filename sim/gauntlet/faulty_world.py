@@ -30,6 +30,9 @@ MINUTE = COMMON | {
     "schedule": {"add_s": 110.0, "stop_s": 30.0, "finish_s": 22.0, "blocks": 1},
     "rotation": {"turns": 1.5, "advance_m": 0.8},
 }
+# the same, and a minute in which no fault begins
+CALM_S = 60.0
+CALMED = MINUTE | {"schedule": MINUTE["schedule"] | {"finish_s": MINUTE["schedule"]["finish_s"] + CALM_S}}
 # the tubes are drilled in one after the other
 DRILLED_IN = COMMON | {
     "rig": {"tubes": 2, "tube_length_m": TUBE_LENGTH},

@@ -56,3 +56,18 @@ def test_a_reader_that_raises_what_is_no_line_is_found_with_its_file(
     (file,) = (tmp_path / "kept").iterdir()
     with pytest.raises(ZeroDivisionError):
         careless(file)
+
+
+def read_by(name: str, content: bytes, folder: Path) -> str:
+    kind = next(one for one in KINDS if one.name == name)
+    return read_changed(kind, content, folder / f"found{kind.ending}")
+
+
+@pytest.mark.parametrize("name", ["attitudes", "turn table", "MWD record"])
+@pytest.mark.parametrize("end", [b"\x0b", b"\x1c", "\x85".encode(), "\u2028".encode()])
+def test_a_header_with_what_ends_a_line_elsewhere_is_refused_in_one(name: str, end: bytes, tmp_path: Path) -> None:
+    assert read_by(name, b"position" + end + b"pitch\n1,2\n", tmp_path) == "refused"
+
+
+def test_a_matrix_of_a_number_beyond_all_is_refused(tmp_path: Path) -> None:
+    assert read_by("matrix", b"matrix = [[" + b"9" * 400 + b", 0, 0], [0, 1, 0], [0, 0, 1]]\n", tmp_path) == "refused"

@@ -50,10 +50,11 @@ gauntlet_options = gather_options(
     click.option("--list", "listed", is_flag=True, help="List the kinds of faults."),
     click.option(
         "--plan",
-        type=click.Choice(["minute", "drilled-in"]),
+        type=click.Choice(["minute", "calmed", "drilled-in"]),
         default="minute",
         show_default=True,
-        help="A string that drills for a minute, or one that is drilled in tube by tube.",
+        help="A string that drills for a minute; the same and a calm minute, after which all is to be well; "
+        "or one that is drilled in tube by tube.",
     ),
     click.option(
         "--soak", "hours", type=click.FloatRange(1.0), help="Instead, hours of rig time of one rig under faults."
@@ -77,6 +78,7 @@ def gauntlet(request: GauntletRequest, listed: bool, hours: float | None, out: P
     Examples:
       borechain gauntlet --seeds 100
       borechain gauntlet --seed 17 --exactly node-cut,loss
+      borechain gauntlet --seeds 100 --plan calmed
       borechain gauntlet --soak 24
     """
     if listed:

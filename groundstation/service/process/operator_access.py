@@ -207,11 +207,12 @@ class OperatorAccess:
         SelectorError
             When the depth neither jumped nor is refused, and contradicts nothing.
         """
-        stands = self._model.rig_alarms.stands
-        if not (self._string.depths.jumped or any(stands(code, "depth") for code in DOUBTS_OF_DEPTH)):
+        doubted = [one for one in self._model.rig_alarms if one.kind.code in DOUBTS_OF_DEPTH]
+        if not (self._string.depths.jumped or doubted):
             raise SelectorError("accept_depth: expected a depth that jumped or is refused, nothing speaks against it")
         self._string.depths.accept()
-        self._model.rig_alarms.clear("depth_refused", "depth")
+        for subject in [one.subject for one in doubted if one.kind.code == "depth_refused"]:
+            self._model.rig_alarms.clear("depth_refused", subject)
         order.advance(OrderState.DONE)
 
     def accept_joints(self, order: SentOrder) -> None:

@@ -116,9 +116,9 @@ class KnownString:
         return is_newest is not None
 
     def _on_hops(self, tube: int, hops: int) -> None:
-        """Give a tube its place; the other of two with one number has none where it speaks in the place of a tube."""
-        others = (one for one in self.tally.tubes if one != tube and self.tally.place_of(one) == hops)
-        if tube < OTHER or not any(map(self.states.is_stale, others)):
+        """Give a tube its place; the other of two with one number has none where one has taken the place of a tube."""
+        places = [hops, *(self.tally.place_of(one) for one in self.tally.tubes)]
+        if tube < OTHER or tube in self.tally.tubes or len(set(places)) == len(places):
             self.tally.on_hops(tube, hops)
 
     def on_doubled(self) -> None:
