@@ -92,7 +92,7 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.statistical
 @pytest.mark.timeout(1800)
 def test_three_of_four_planted_defects_are_noticed(calls: Path, drawn: Path, tmp_path: Path) -> None:
-    """NOTICED of 200 so far, 133 of them by the calls of worlds: most that are not shift a bound by one count.
+    """151 of 200 so far, 133 of them by the calls of worlds: most that are not shift a bound by one count.
 
     The aim is 180. Of the drawn calls some have no meaning in either language, so what is said is compared.
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.survey.path.kernels.copied_rows import copy_rows
 from node.kernels.arithmetic.jit import allocating_kernel
 
 Array = npt.NDArray[np.float64]
@@ -28,8 +29,12 @@ def free_parts(
     at = np.empty(width, np.intp)
     cov, rows = np.empty((width, width)), np.empty((3, width))
     for k in range(len(station)):
-        rows[:, :9] = jacobians[k]
-        rows[:, 9], rows[:, 10:] = jacobians[k][:, 7], extra[k]
+        for i in range(3):
+            for a in range(9):
+                rows[i, a] = jacobians[k, i, a]
+            rows[i, 9] = jacobians[k, i, 7]
+            for a in range(count):
+                rows[i, 10 + a] = extra[k, i, a]
         for a in range(6):
             at[2 + a] = 6 * tube[k] + a
         at[8], at[9] = gravity_at, gravity_at + 1 + make_up[k]
@@ -42,7 +47,9 @@ def free_parts(
 @allocating_kernel
 def gather_covariance(of_direction: Array, coupled: Array, of_common: Array, at: Places, out: Array) -> None:
     """Covariance of the unknowns of one look: a direction (2) and what it has in common with others."""
-    out[:2, :2] = of_direction
+    for a in range(2):
+        for b in range(2):
+            out[a, b] = of_direction[a, b]
     for a in range(2, len(at)):
         for b in range(2):
             out[a, b] = out[b, a] = coupled[b, at[a]]
@@ -58,7 +65,7 @@ def take_from_weight(weight: Array, rows: Array, cov: Array, out: Array) -> None
         for i in range(3):
             for b in range(rows.shape[1]):
                 weighed[a, b] += weight[a, i] * rows[i, b]
-    out[:] = weight
+    copy_rows(weight, out)
     for a in range(rows.shape[1]):
         for b in range(rows.shape[1]):
             for i in range(3):

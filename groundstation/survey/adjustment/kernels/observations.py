@@ -102,6 +102,18 @@ def invert_in_place(m: Array) -> None:
     m[1, 0], m[2, 0], m[2, 1] = m[0, 1], m[0, 2], m[1, 2]
 
 
+@kernel
+def gather_columns(jacobian: Array, extra: Array, residual: Array, rows: Array) -> None:
+    """Columns (3, 9 + e) of one look: of its tube, of gravity, of its make-up, further effects, the right side."""
+    for i in range(3):
+        for a in range(6):
+            rows[i, a] = jacobian[i, 2 + a]
+        rows[i, 6], rows[i, 7] = jacobian[i, 8], jacobian[i, 7]
+        for a in range(extra.shape[1]):
+            rows[i, 8 + a] = extra[i, a]
+        rows[i, 8 + extra.shape[1]] = residual[i]
+
+
 @allocating_kernel
 def add_looks(
     station: Places, tube: Places, make_up: Places, jacobians: Array, weights: Array, residuals: Array, extra: Array,
@@ -129,14 +141,11 @@ def add_looks(
         j, w = jacobians[k], weights[k]
         for a in range(6):
             at[a] = 6 * tube[k] + a
-            rows[:, a] = j[:, 2 + a]
         at[6], at[7] = gravity_at, gravity_at + 1 + make_up[k]
-        rows[:, 6], rows[:, 7] = j[:, 8], j[:, 7]
         for a in range(count):
             at[8 + a] = right - count + a
-            rows[:, 8 + a] = extra[k, :, a]
         at[width] = right
-        rows[:, width] = residuals[k]
+        gather_columns(j, extra[k], residuals[k], rows)
         for a in range(3):
             for b in range(width + 1):
                 weighed[a, b] = w[a, 0] * rows[0, b] + w[a, 1] * rows[1, b] + w[a, 2] * rows[2, b]

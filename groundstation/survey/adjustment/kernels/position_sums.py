@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.kernels.path_elimination import divide_by_transposed, take_image
+from groundstation.survey.path.kernels.copied_rows import copy_rows
 from node.kernels.arithmetic.jit import allocating_kernel, kernel
 
 Array = npt.NDArray[np.float64]
@@ -41,7 +42,9 @@ def position_sums(
         if j > 0:
             take_image(root, tied[j], steps[j])
     for j in range(count - 1, -1, -1):
-        grown[j, :2, :2] += of_looks[j]
+        for a in range(2):
+            for b in range(2):
+                grown[j, a, b] += of_looks[j, a, b]
         if j > 0:
             passed = np.zeros((4, 4))
             add_product(grown[j], steps[j], passed)
@@ -83,7 +86,8 @@ def carry_covariance(cov: Array, change: Array, step: Array, turned: Array, nois
     add_product(step, cov, half)
     add_product(turned, cov, by_turn)
     add_product(step, change, by_change)
-    cov[:], change[:] = noise, lost
+    copy_rows(noise, cov)
+    copy_rows(lost, change)
     add_product(half, step.T, cov)
     add_product(half, turned.T, change)
     add_product(by_turn, step.T, change)

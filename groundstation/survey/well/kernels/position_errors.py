@@ -13,13 +13,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.arithmetic.jit import allocating_kernel, kernel
+from groundstation.survey.path.kernels.copied_rows import copy_rows
+from node.kernels.arithmetic.jit import kernel
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
 
 
-@allocating_kernel
+@kernel
 def add_stations(
     weights: Array, ends: Array, starts: Places, places: Places, lean: Array, down: Array, covs: Array, kinks: Array,
     alongs: Array, depth_starts: Places, depth_places: Places, depths: Array, widths: Places, passed: Array,
@@ -58,7 +59,7 @@ def add_stations(
             s = depth_places[c]
             for i in range(3):
                 passed[i, s] += kinks[k, i] * depths[c]
-        here[:] = passed
+        copy_rows(passed, here)
         for c in range(starts[k + 1], starts[k + 2]):
             s = places[c]
             here[0, s] += end * lean[0, c]
@@ -69,7 +70,7 @@ def add_stations(
             for i in range(3):
                 here[i, s] += alongs[k, i] * depths[c]
         if len(shared) > 0:
-            shared[k] = here
+            copy_rows(here, shared[k])
         nn = ne = nd = ee = ed = dd = 0.0
         for s in range(widths[k]):
             n, e, d = here[0, s], here[1, s], here[2, s]
@@ -85,7 +86,8 @@ def add_stations(
                 own[i, j] += weight * weight * covs[k, i, j]
                 out[k, i, j] = own[i, j] + end * end * covs[k + 1, i, j] + of_shared[i][j]
         if k == first + mark * every:
-            marks[mark], own_marks[mark] = passed, own
+            copy_rows(passed, marks[mark])
+            copy_rows(own, own_marks[mark])
             mark += 1
 
 
