@@ -33,7 +33,8 @@ from groundstation.service.alarms.verdict import Deadline, chance_text
 from groundstation.service.alarms.verdict_words import Word
 from groundstation.service.answers.alarm_views import tolerance_alarm_row
 from groundstation.service.hole.deviation_alarms import AlarmList, DeviationAlarm
-from groundstation.service.hole.history import History
+from groundstation.service.hole.history import SAME_STOP, History
+from groundstation.service.hole.movement import Movement
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
 from groundstation.service.orders import surveyed_biases as biases_room
@@ -551,3 +552,14 @@ def test_what_tubes_say_of_a_station_before_and_after_it_moved_is_of_two_station
     station.drops = [1]
     hole: Any = SimpleNamespace(stations=[collar, station])
     assert [look.station for look in biases_room._looks_of_hole(hole, 9.81)] == [(2.0, 0), (2.0, 1), (2.0, 1)]
+
+
+@pytest.mark.parametrize("since", [100.0, 104.0, 120.0, 130.0])
+def test_stops_of_the_string_are_parted_where_nothing_was_read_for_exactly_so_long(since: float) -> None:
+    table = ResolvedStops()
+    station = SurveyStation(2.0, table)
+    for number, at in enumerate((100.0, 105.0, 105.0 + SAME_STOP, 119.0 + SAME_STOP, 190.0)):
+        station.add_stop(stops_of(1, number, at), 0)
+    found = Movement(table, [station] * 5)._stops_since(since)
+    parts = [[100.0, 105.0], [120.0, 134.0], [190.0]]
+    assert [[one.at for one in stop] for stop in found] == parts[0 if since < 120.0 else 1 :]

@@ -21,8 +21,10 @@ from sim.world.rack import RackTruth
 from sim.world.radio import Bursts, power_of
 from sim.world.radio_section import RadioSection
 from sim.world.random_streams import RandomStream, random_stream
+from sim.world.scenario import scenario_of
 from sim.world.torsion import polar_moment, smooth_step
 from sim.world.truth import lean_rotation
+from sim.world.world import World
 from telemetry.messages import Side
 
 # what happens to frames
@@ -232,3 +234,15 @@ def test_a_joint_keeps_all_its_slips() -> None:
     imu: Any = SimpleNamespace(section_of=lambda _row: JointSlipsSection(slip_deg=4.0, after_s=3.0))
     slip_at_stops(motion, imu, None)
     assert np.degrees(motion.angle - 0.1 * t) == pytest.approx([0.0, 0.0, 2.0, 4.0, 8.0, 8.0])
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_the_lowest_tube_has_no_joint_below_and_no_error_of_one(seed: int) -> None:
+    tables: dict[str, Any] = {
+        "rig": {"tubes": 3, "tube_length_m": 2.0},
+        "path": {"spiral": {"inclination_deg": 10.0, "azimuth_deg": 20.0, "build_deg": 30.0}},
+        "joints": {"reading_std_deg": 0.5},
+    }
+    marks = World(scenario_of(tables), seed).marks
+    assert marks.read(1).lower_joint.angle == 0.0
+    assert all(marks.read(tube).lower_joint.angle != 0.0 for tube in (2, 3))
