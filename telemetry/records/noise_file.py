@@ -53,7 +53,7 @@ def read_gyro_noise(path: Path) -> GyroNoise:
 
 def _numbers(path: Path, axes: list[Any], name: str, scale: float, largest: float) -> Vector3:
     """One number of each axis in SI."""
-    found = [axis.get(name) if isinstance(axis, dict) else None for axis in axes]
+    found: list[Any] = [axis.get(name) if isinstance(axis, dict) else None for axis in axes]
     for axis, value in zip(AXES, found, strict=True):
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not is_number or not 0.0 < scale * value <= largest:

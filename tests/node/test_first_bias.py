@@ -19,6 +19,7 @@ from node.process.tube_process import TubeProcess
 from telemetry.application.clock import ClockFilter
 from telemetry.messages import Aiding
 
+pytestmark = pytest.mark.slow
 RATE = 100.0
 REAL = Path(__file__).parents[1] / "data" / "records" / "mpu9150-imu0-100hz.npy"
 OFFSET = np.array([4.54, 0.05, 1.12])  # deg/s

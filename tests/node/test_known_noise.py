@@ -22,6 +22,7 @@ from telemetry.errors import LoggerError
 from telemetry.parameters import SensorParameters
 from telemetry.records.noise_file import read_gyro_noise
 
+pytestmark = pytest.mark.slow
 RATE = 20.0
 WHITE, BIAS, TAU = 0.004, 0.02, 200.0  # deg/s/sqrt(Hz), deg/s, s
 
