@@ -17,6 +17,7 @@ from node.kernels.record.filter_record import Scheme
 from node.kernels.record.node_record import SETTINGS
 from node.kernels.record.sensor_record import MAX_IMUS
 from telemetry.messages import MAX_TUBE, UNKNOWN_YAW_STD
+from telemetry.records.noise_file import GyroNoise
 
 Kernel: TypeAlias = Literal["float64", "fixed"]
 KERNELS: Final = get_args(Kernel)
@@ -68,6 +69,7 @@ class TubeSettings:
     unseen_std: float = 0.01 * DEG  # rad, what may turn unseen while a joint is made up
     imus: tuple[ImuSettings, ...] = (ImuSettings(),)  # of its cluster
     reach: int = 1  # tubes away that its radio hears; beyond 1 tubes are numbered from the lowest up, without a gap
+    gyro_noise: GyroNoise | None = None  # of its own sensors, by a record at rest; None: that of the configuration
     above: tuple[PassedTube, ...] = ()  # the next tubes above, nearest first; reach - 1 of them are used
 
     def __post_init__(self) -> None:

@@ -45,6 +45,7 @@ class TubeRequest:
     stiffness_nm: float
     torsion: Literal["gate", "variance"]
     joints: Literal["marks", "solved", "both"]
+    gyro_noise: Path | None
     imus: ClusterRequest
 
     def to_settings(self) -> TubeSettings:
@@ -52,11 +53,12 @@ class TubeRequest:
 
         Raises
         ------
-        NodeConfigurationError, CalibrationError
-            When a setting is outside its range, or a file is not a calibration.
+        NodeConfigurationError, CalibrationError, LoggerError
+            When a setting is outside its range, or a file is not a calibration, or not of a gyroscope's noise.
         """
         from node.firmware.tube_settings import TubeSettings
         from node.kernels.record.filter_record import Scheme
+        from telemetry.records.noise_file import read_gyro_noise
 
         return TubeSettings(
             tube=self.tube,
@@ -69,6 +71,7 @@ class TubeRequest:
             torsion=self.torsion,
             joints=self.joints,
             imus=self.imus.to_settings(),
+            gyro_noise=None if self.gyro_noise is None else read_gyro_noise(self.gyro_noise),
         )
 
     def _angle_of(self, read_deg: float | None) -> MakeUpAngle:
@@ -147,6 +150,11 @@ SETTING_OPTIONS = (
         type=float,
         multiple=True,
         help="Noise of an IMU as a multiple of the default. Once for each IMU.",
+    ),
+    click.option(
+        "--gyro-noise",
+        type=FILE,
+        help="File of borechain allan --out: noise of the gyroscopes at rest, and how long their biases last.",
     ),
     click.option(
         "--imu-offset-mm",

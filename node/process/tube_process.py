@@ -12,6 +12,7 @@ import numpy as np
 from node.errors import NodeConfigurationError
 from node.firmware.inputs import RigContext
 from node.firmware.saved_state import resume_node
+from node.firmware.sensor_config import sensor_config
 from node.firmware.silent_tubes import aiding_across_silent
 from node.firmware.tube import Tube
 from node.firmware.tube_settings import TubeSettings
@@ -71,7 +72,8 @@ class TubeProcess(Process):
     ----------
     settings : what the crew entered
     folder : where the state is saved
-    config : one record of dtype ``CONFIG``; the default is that of an MPU6500-class node
+    config : one record of dtype ``CONFIG``; the default is that of an MPU6500-class node, and of one with sensors of
+        its own that of ``node.firmware.sensor_config``
     key : of the rig; without one, and without seals, the node takes no parameter block
     imus : the node's own sensors, as many as the settings have; without any a cycle brings its reading
     timing : durations of its cycles with an own clock; None where it is stepped
@@ -106,7 +108,11 @@ class TubeProcess(Process):
             imu.start()
         self._sources = imus
         self._imus = [SafeImu(imu, self._send_event, k if len(imus) > 1 else 0) for k, imu in enumerate(imus, 1)]
-        self.config = default_config() if config is None else config
+        store = BlockStore(folder, disk)
+        parameters = load_parameters(store, settings.tube)
+        if config is None:
+            config = sensor_config(settings, parameters) if imus else default_config()
+        self.config = config
         self._saver = Saver(folder, disk)
         # apart from the saved state: a node that lost its state must not look like an earlier boot
         counter = BootCounter(folder, disk=disk)
@@ -117,8 +123,6 @@ class TubeProcess(Process):
         saved = self._saver.load()
         self.nodes, telemetry = saved if saved else (new_node(self.config), None)
         self._cut = resume_node(self.nodes, self.config) if saved else False
-        store = BlockStore(folder, disk)
-        parameters = load_parameters(store, settings.tube)
         self._fallback = "; ".join(store.faults)
         if self._fallback:
             state = self.nodes[0]["filter"]

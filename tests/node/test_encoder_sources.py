@@ -122,6 +122,41 @@ def test_a_counter_is_read_in_the_middle_of_its_count_and_its_levels_prove_it(tm
     assert told.events == []
 
 
+def test_a_counter_gives_the_same_yaw_as_a_record_of_its_counts(tmp_path: Path) -> None:
+    """Forward, to rest, back: turning and resting the yaw of the device is that of ``time, count`` replayed."""
+    counter = EmulatedCounter(tmp_path, begin=(1 << 32) - 5)  # it wraps on the way
+    source = QuadratureFile(counter_file("/dev/counter0", tmp_path))
+    source.start()
+    live, aidings, rows = EncoderNode(), [], []
+    forward = turning(1.2, 14.0, 2.0)
+    for k in range(60):
+        end = START + (k + 1) * PERIOD
+        count = math.floor(forward((k + 1) * PERIOD) - 700.0 * max(k - 40, 0))
+        counter.turn_to((1 << 32) - 5 + count)
+        aidings.append(live.on_cycle(source.read(end), end))
+        rows.append([end, count])
+    np.save(tmp_path / "counts.npy", np.array(rows, dtype=np.float64))
+    replay, again = encoder_source(f"replay:{tmp_path / 'counts.npy'}"), EncoderNode()
+    replay.start()
+    for k, aiding in enumerate(aidings):
+        other = again.on_cycle(replay.read(START + (k + 1) * PERIOD), START + (k + 1) * PERIOD)
+        assert abs(math.degrees(math.remainder(aiding.yaw - other.yaw, 2.0 * math.pi))) < 0.01, k
+        assert (aiding.yaw_var, aiding.rate, aiding.sequence) == pytest.approx(
+            (other.yaw_var, other.rate, other.sequence)
+        )
+    assert min(count for _, count in rows) < 0 < max(count for _, count in rows)
+
+
+def test_counts_alone_that_are_none_are_named_by_their_row(tmp_path: Path) -> None:
+    (tmp_path / "counts.csv").write_text("time,count\n0,5\n0.5,nan\n1,6\n")
+    source = encoder_source(f"replay:{tmp_path / 'counts.csv'}")
+    source.start()
+    assert source.read(START).count == 5
+    with pytest.raises(SensorError, match=r"counts\.csv: row 2: expected a count, got nan"):
+        source.read(START + PERIOD)
+    assert source.read(START + 2.0 * PERIOD).count == 6
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_a_counter_that_stands_or_loses_edges_is_named_within_two_turning_cycles(tmp_path: Path, seed: int) -> None:
     random = np.random.default_rng(seed)

@@ -151,7 +151,10 @@ GUARD: Final = np.dtype(
         ("untimely", "i8"),  # 1: the aiding before was untimely
         ("reversed", "i8"),  # 1: the encoder counts against the gyroscope
         ("stands", "i8"),  # aidings in a row of a head at rest, while the gyroscope goes on turning
-        ("rest_cycles", "i8"),  # cycles in a row in which the encoder reports a head at rest
+        (
+            "rest_cycles",
+            "i8",
+        ),  # cycles in a row of a head at rest, by the encoder; below 0: of a node alone, without a bias
         ("doubted", "i8"),  # 1: innovations are larger than their variance explains
         ("misfit", "f8"),  # mean of their squares over their variances
         ("excess", "f8"),  # rad^2, mean of their squares beyond their variances

@@ -5,6 +5,9 @@ at rest and the gyroscope's readings scatter as noise does, their mean is the bi
 the one in use it takes its place, and the node stands still again. A tube that is tilted steadily under a resting head
 reads a steady rate too, but its gravity turns with it. How far the bias moved is from then on the standard deviation of
 what it may do until the next stop; every rest without a move halves that.
+
+A node without a bias that hears of no head, as on a table, has its readings alone: what is steady within its limit of
+rest for as long as a bias is learnt over, and does not turn gravity, is a bias, up to the size that one may have.
 """
 
 from __future__ import annotations
@@ -29,6 +32,7 @@ from node.kernels.filter.priors import bias_var, calm_bias, noise_over, widen_bi
 from node.kernels.filter.resets import doubt_yaw, move_bias
 from node.kernels.record.events import Code, event_degrees, queue_event
 from node.kernels.record.filter_record import RING
+from node.kernels.turns.sensor_trust import is_faulty
 
 CYCLES: Final = 8  # whose mean and spread are looked at
 SETTLING: Final = 2  # cycles of a rest before those
@@ -43,8 +47,13 @@ BIAS_MOVED = kernel_constant(Code.BIAS_MOVED)
 def watch_rest(node: Any, settings: Any, at: float) -> None:
     """Look at the rest that the encoder reports, every ``CYCLES`` cycles; ``at`` (s, own clock) is now."""
     state, guard = node.filter, node.guard
-    told = guard.rate == 0 and abs(at - guard.rate_at) <= RATE_AGE
-    guard.rest_cycles = guard.rest_cycles + 1 if told and guard.gyro.fault == 0 else 0
+    heard = abs(at - guard.rate_at) <= RATE_AGE
+    searching = state.mode == STATIC_BIAS and not is_faulty(guard.gyro)  # no aiding proves a gyroscope without a bias
+    if searching and not heard:
+        watch_alone(node, settings)
+        return
+    told = guard.rate == 0 and heard and (searching or guard.gyro.fault == 0)
+    guard.rest_cycles = max(guard.rest_cycles, 0) + 1 if told else 0
     since = guard.rest_cycles - SETTLING
     if since < CYCLES or since % CYCLES != 0 or state.cycles < CYCLES or not is_calm(state, node.config):
         return
@@ -55,6 +64,36 @@ def watch_rest(node: Any, settings: Any, at: float) -> None:
         guard.unproven = 0
         if since == CYCLES:
             calm_down(node, settings)
+
+
+@kernel
+def watch_alone(node: Any, settings: Any) -> None:
+    """Look, every ``CYCLES`` cycles, whether the readings of a node that has no bias and hears of no head are steady.
+
+    Less than 0 ``rest_cycles`` counts such cycles: no rest that an encoder reports.
+    """
+    state, guard = node.filter, node.guard
+    guard.rest_cycles = min(guard.rest_cycles, 0) - 1
+    since = -guard.rest_cycles - SETTLING
+    if since < CYCLES or since % CYCLES != 0 or state.cycles < CYCLES:
+        return
+    if not is_steady(state, node.config):
+        guard.rest_cycles = 0
+    elif since >= node.config.static_cycles and has_moved(state, node.config) and not is_tilting(state, node.config):
+        take_bias(node, settings, since)
+        guard.rest_cycles = 0
+
+
+@kernel
+def is_steady(state: Any, config: Any) -> bool:
+    """Whether each of the last cycles is as near to their mean as a node at rest is to its bias."""
+    for k in range(3):
+        usual = mean_rate(state, k)
+        limit = config.still_rate if k == 2 else 2 * config.still_rate
+        for n in range(CYCLES):
+            if abs(state.ring_rate[(state.cycles - 1 - n) % RING, k] - usual) > limit:
+                return False
+    return True
 
 
 @kernel
@@ -114,17 +153,20 @@ def has_moved(state: Any, config: Any) -> bool:
     """Whether the mean of the last cycles is beyond the constant bias; before there is one, beyond what counts as rest.
 
     What the filter has put into the part that wanders does not count: it would forget it. A node that does not stand
-    still by its bias needs no more evidence.
+    still by its bias needs no more evidence. Before there is a bias, a mean that is as near to the limit of a rest as
+    noise takes single cycles beyond it is one too: those would begin the average anew for ever.
     """
     newest = (state.cycles - 1) % RING
-    length = CYCLES * (state.ring_end[newest] - state.ring_start[newest])
+    period = state.ring_end[newest] - state.ring_start[newest]
+    length = CYCLES * period
     moved = bool(state.mode != STATIC_BIAS and state.still_cycles == 0)
     for k in range(3):
         usual = mean_rate(state, k)
         if abs(usual) > LARGEST:
             return False
         if state.mode == STATIC_BIAS:
-            moved = moved or bool(abs(usual) > UNBIASED_STILL_RATE)
+            loud = MOVED * angular_root(noise_over(config, k, 1, period))
+            moved = moved or bool(abs(usual) > UNBIASED_STILL_RATE - loud)
             continue
         var = state.static_bias_var[k] + bias_var(config, k) + noise_over(config, k, 1, length)
         moved = moved or bool(abs(usual - state.static_bias[k]) > MOVED * angular_root(var))
@@ -149,7 +191,7 @@ def take_bias(node: Any, settings: Any, since: int) -> None:
     moved_z = off
     if not known:
         state.mode = TRACKING
-    doubt_yaw(state, angular_square(turned_angle(moved_z * since, period)) if known else 0)
+    doubt_yaw(state, angular_square(turned_angle(moved_z * since, period)))
     state.rejected = 0
     guard.before_steps = NONE
     guard.step.fault = 0

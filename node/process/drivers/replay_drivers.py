@@ -4,7 +4,8 @@ IMU: any record that ``telemetry.records`` reads. One whose rows are cycles play
 says; one of a faster sensor plays the mean of the rows of each cycle, by its own times, which begin with the first
 cycle.
 Encoder: ``time, count, edge_at, rising`` and, if they were taken, the times of the edges before the last in its
-direction, newest first; s, counts, s, 1 or 0, s. A row that has fewer of them repeats the oldest.
+direction, newest first; s, counts, s, 1 or 0, s. A row that has fewer of them repeats the oldest. ``time, count`` of a
+counter that does not time its edges: a changed count is read in its middle, as from the device.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from node.process.drivers.source import ImuSample
 from telemetry.records.record_reading import RecordReading
 
 Rows = npt.NDArray[np.float64]
+COUNTS_ALONE = 2  # columns of a counter that does not time its edges
 ENCODER_COLUMNS = tuple(range(4, 4 + EDGES))
 FARTHEST = 1e15  # of a count
 A_CYCLE = 0.5  # of a cycle: rows that are closer are a sensor's samples, and are averaged
@@ -51,7 +53,8 @@ class ReplayImu:
         if self._means.period < A_CYCLE * (end - begin):
             if self._shift is None:
                 self._shift = self._means.first - begin
-            return self._means.mean(begin + self._shift, end + self._shift)
+            first = max(begin + self._shift, self._means.first)  # by rounding the first cycle may begin before it
+            return self._means.mean(first, end + self._shift)
         k, self._next = self._next, self._next + 1
         return self._means.row(k)
 
@@ -67,24 +70,37 @@ class ReplayEncoder:
         self._rows: Rows | None = None
         self._next = 0
         self._shift: float | None = None
+        self._untimed = EncoderSample(0, 0.0, rising=True, timed=False)
 
     def start(self) -> None:
         """Read the file on the first start; later starts continue after the row that failed."""
         if self._rows is None:
-            self._rows = load_rows(self._path, ENCODER_COLUMNS)
+            self._rows = load_rows(self._path, (COUNTS_ALONE, *ENCODER_COLUMNS))
 
     def read(self, now: float) -> EncoderSample:
         """The next row."""
         if self._rows is None or self._next >= len(self._rows):
             raise SensorError(f"{self._path}: the recording has ended, or was not started")
-        at, count, edge_at, rising, *earlier = self._rows[self._next].tolist()
+        row = self._rows[self._next].tolist()
         self._next += 1
+        if len(row) == COUNTS_ALONE:
+            return self._count_alone(row[1], now)
+        at, count, edge_at, rising, *earlier = row
         if not (math.isfinite(at) and math.isfinite(edge_at) and abs(count) < FARTHEST and edge_at <= at):
             raise SensorError(f"{self._path}: row {self._next}: expected a count and an edge before its time")
         if self._shift is None:
             self._shift = now - at
         moved = tuple(edge + self._shift for edge in earlier)
         return EncoderSample(int(count), edge_at + self._shift, rising > 0.5, earlier=moved)
+
+    def _count_alone(self, count: float, now: float) -> EncoderSample:
+        """Sample of a count whose edges have no times: the newest was passed by the read that found another count."""
+        if not abs(count) < FARTHEST:
+            raise SensorError(f"{self._path}: row {self._next}: expected a count, got {count}")
+        last = self._untimed
+        if int(count) != last.count:
+            self._untimed = EncoderSample(int(count), now, rising=count > last.count, timed=False)
+        return self._untimed
 
     def close(self) -> None:
         """Nothing to release."""
@@ -104,7 +120,7 @@ def load_rows(path: Path, columns: tuple[int, ...]) -> Rows:
     except (OSError, ValueError, TypeError) as error:
         raise SensorError(f"{path}: {error}") from error
     if rows.ndim != 2 or len(rows) == 0 or rows.shape[1] not in columns:
-        wanted = f"{columns[0]} to {columns[-1]}"
+        wanted = ", ".join(map(str, columns))
         raise SensorError(f"{path}: expected rows of {wanted} columns, got an array of shape {rows.shape}")
     return rows
 
