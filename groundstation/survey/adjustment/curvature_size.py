@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 HOLE_KNOWN_AS = 6.0  # directions that the size of the hole's curvature before them counts for
 LEG_KNOWN_AS = 4.0  # likewise of one leg, that of the hole: the degrees of freedom of its tails
+OF_LEG = 2.0  # directions that the bend of a leg tells of it, about
+FEWEST_BELOW = 2  # legs that tell how a hole bends without its first
 TOGETHER = 4  # rounds
 LEAST = 1e-12  # rad^2/m^2
 
@@ -48,6 +50,18 @@ def learnt_curvature(found: Adjusted) -> tuple[float, Array]:
         legs = (LEG_KNOWN_AS * whole + seen) / (LEG_KNOWN_AS + free)
         whole = (known + whole * float(np.sum(seen / legs))) / known_as
     return max(whole, LEAST), np.maximum(legs, LEAST)
+
+
+def curvature_below(found: Adjusted) -> float:
+    """Variance (rad^2/m^2) of the curvature of the hole as the legs below the first tell it; of few, as all do."""
+    now, legs = found.now, found.now.leg_vars[1:]
+    if len(legs) < FEWEST_BELOW:
+        return now.curvature_var
+    go, rigid = leg_steps(found.path)
+    off = path_departures(found.path, now, found.linear.bases, go)[1:]
+    told = float(np.sum(np.einsum("ka,kab,kb->k", off, rigid[1:], off) / legs))
+    known = HOLE_KNOWN_AS * found.path.curvature_std**2 + now.curvature_var * told
+    return known / (HOLE_KNOWN_AS + OF_LEG * len(legs))
 
 
 def curvature_deviance(now: StartingPoint, before: float) -> float:
