@@ -6,6 +6,7 @@ it is their directions, carried up by what is known of the path; against that wh
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,9 +18,10 @@ from groundstation.survey.adjustment.equations import KNOWN, STATE, leg_steps
 from groundstation.survey.adjustment.looks import PathPrior
 from groundstation.survey.adjustment.scores import best_sizes
 from groundstation.survey.adjustment.sphere import bends_between
-from groundstation.survey.path.leg_wander import UNTIED, CollarTie
+from groundstation.survey.path.leg_wander import CollarTie
 
 Array = npt.NDArray[np.float64]
+TIED_LEGS = 8  # with which the direction at the collar goes; of those below nothing is left
 WIDE_COLLAR = 0.5  # rad, of a collar that was told wrong, before the stations tell it
 
 
@@ -72,15 +74,20 @@ def collar_departure(found: Adjusted) -> CollarDeparture:
     return CollarDeparture(sizes[0], cov, float(squares[0]), int(told[0]))
 
 
-def collar_tie(found: Adjusted) -> CollarTie:
-    """How the direction at the collar of an adjustment goes with the curvature of its first leg."""
-    if len(found.path.md) < 2:
-        return UNTIED
+def collar_ties(found: Adjusted) -> tuple[CollarTie, ...]:
+    """How the direction at the collar of an adjustment goes with the curvature of its first legs, leg by leg."""
     one = np.zeros((len(found.path.md), 2, 2))
     one[0] = np.eye(2)
     states, _ = found.cofactor(one, np.zeros((len(found.common_cov), 2)))
-    departs = states[1] - leg_steps(found.path)[0][0] @ states[0]
-    return CollarTie(*(0.5 * float(np.trace(part)) for part in (states[0, 2:], departs[:2], departs[2:])))
+    states = states[: TIED_LEGS + 1]
+    departs = states[1:] - leg_steps(found.path)[0][:TIED_LEGS] @ states[:-1]
+    parts = (states[:-1, 2:], departs[:, :2], departs[:, 2:])
+    return tuple(itertools.starmap(CollarTie, zip(*(_each_way(part) for part in parts), strict=True)))
+
+
+def _each_way(parts: Array) -> list[float]:
+    """Means over both axes of blocks (n, 2, 2)."""
+    return (0.5 * np.trace(parts, axis1=1, axis2=2)).tolist()
 
 
 def untold_collar(path: PathPrior) -> PathPrior:
