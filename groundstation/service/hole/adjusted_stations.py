@@ -83,7 +83,7 @@ def adjusted_stations(
         return AdjustedStations(told, alone, told=told, below=below, stops=stops)
     collar, *found = directions_of(examined.examination, shared, north)
     moved = moved_stations(examined, below)
-    return AdjustedStations(collar, dict(zip(mds, found, strict=True)), moved, examined.adjusted, told, below, stops)
+    return AdjustedStations(collar, dict(zip(mds, found, strict=True)), moved, examined.drawn, told, below, stops)
 
 
 def fused_alone(station: SurveyStation) -> Direction:

@@ -11,11 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.bends_among_holes import bent_as_holes_are
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.collar import collar_departure
 from groundstation.survey.adjustment.hypotheses import BY_DEPTH, KNOWN_SIZE, WIDTHS, Hypothesis, all_hypotheses
@@ -85,7 +87,7 @@ class Blunder:
         return tuple(one.hypothesis for one in both)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # with a dictionary, for what is worked out once
 class Examination:
     """A hole adjusted with all that was found.
 
@@ -102,6 +104,15 @@ class Examination:
     suspicion: Blunder | None = None
     supposed: Adjusted | None = None
 
+    @cached_property
+    def drawn(self) -> Adjusted:
+        """The hole as it is drawn: as ``adjusted``, by how sharply it seems to bend among all holes.
+
+        What is wrong is looked for in a hole that may bend as is usual, so that a blunder is not taken for a bend of a
+        calm one; the ± of its positions is that of this hole.
+        """
+        return bent_as_holes_are(self.adjusted)
+
     @property
     def explained(self) -> Adjusted:
         """The hole with all that was found, the suspicion too."""
@@ -114,7 +125,7 @@ class Examination:
         It is one standard deviation more: most suspicions are none, so none moves a direction.
         """
         off = self.explained.now.tangents - self.adjusted.now.tangents
-        return np.asarray(np.einsum("kai,ki->ka", self.adjusted.bases, off))
+        return np.asarray(np.einsum("kai,ki->ka", self.drawn.bases, off))
 
     @property
     def taken_in(self) -> tuple[Hypothesis, ...]:

@@ -37,19 +37,29 @@ def learnt_curvature(found: Adjusted) -> tuple[float, Array]:
     before, legs = found.path.curvature_std**2, found.now.leg_vars
     if not len(legs):
         return before, legs
-    go, rigid = leg_steps(found.path)
-    off = path_departures(found.path, found.now, found.linear.bases, go)
-    seen = np.einsum("ka,kab,kb->k", off, rigid, off)
-    free = off.shape[1] - np.einsum("kab,kba->k", rigid, departure_covs(found, go)) / legs
-    at_collar = found.now.curvatures[0]
-    free_at_collar = 2.0 - float(np.trace(found.covs[0, 2:, 2:])) / found.now.curvature_var
-    known = HOLE_KNOWN_AS * before + float(at_collar @ at_collar)
-    known_as = HOLE_KNOWN_AS + free_at_collar + float(free.sum())
+    seen, free = bends_seen(found)
+    known, known_as = HOLE_KNOWN_AS * before + seen[0], HOLE_KNOWN_AS + float(free.sum())
+    (seen, free) = seen[1:], free[1:]
     whole = found.now.curvature_var
     for _ in range(TOGETHER):
         legs = (LEG_KNOWN_AS * whole + seen) / (LEG_KNOWN_AS + free)
         whole = (known + whole * float(np.sum(seen / legs))) / known_as
     return max(whole, LEAST), np.maximum(legs, LEAST)
+
+
+def bends_seen(found: Adjusted) -> tuple[Array, Array]:
+    """Squares (s + 1,), rad^2/m^2, of the curvature at the collar and of what drives each leg, and directions in each.
+
+    Of holes that bend as was taken they are their variance times these numbers in the mean.
+    """
+    now = found.now
+    go, rigid = leg_steps(found.path)
+    off = path_departures(found.path, now, found.linear.bases, go)
+    of_legs = np.einsum("ka,kab,kb->k", off, rigid, off)
+    free = off.shape[1] - np.einsum("kab,kba->k", rigid, departure_covs(found, go)) / now.leg_vars
+    at_collar = now.curvatures[0]
+    free_at_collar = 2.0 - float(np.trace(found.covs[0, 2:, 2:])) / now.curvature_var
+    return np.append(at_collar @ at_collar, of_legs), np.append(free_at_collar, free)
 
 
 def curvature_below(found: Adjusted) -> float:
