@@ -87,7 +87,7 @@ def collar_ties(found: Adjusted) -> tuple[CollarTie, ...]:
 
 def _each_way(parts: Array) -> list[float]:
     """Means over both axes of blocks (n, 2, 2)."""
-    return (0.5 * np.trace(parts, axis1=1, axis2=2)).tolist()
+    return [0.5 * float(np.trace(part)) for part in parts]
 
 
 def untold_collar(path: PathPrior) -> PathPrior:
