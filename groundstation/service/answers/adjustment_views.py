@@ -140,8 +140,10 @@ def budget_of_toe(k: RigModel, examined: ExaminedHole) -> list[NamedShare]:
 
 def north_at_toe(k: RigModel) -> Array:
     """Variance (3,), m^2, at the toe by the encoder's zero against north, which is in no look."""
-    north, east, _ = k.hole.trajectory.positions[-1]
-    return np.asarray((np.array([east, north, 0.0]) * min(north_std(k.setup), TURN_MOST)) ** 2)
+    drawn = k.hole.trajectory
+    north, east, _ = drawn.positions[-1]
+    across = (np.array([east, north, 0.0]) * min(north_std(k.setup), TURN_MOST)) ** 2
+    return np.asarray(across + np.diagonal(drawn.swung_covs[-1]))
 
 
 def toe_shares(budget: Sequence[NamedShare]) -> list[ToeShare]:

@@ -15,7 +15,7 @@ from groundstation.service.hole.movement import Moved, moved_stations
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
 from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.collar import collar_tie
+from groundstation.survey.adjustment.collar import collar_ties
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import SharedErrors
@@ -83,7 +83,7 @@ def adjusted_stations(
         return AdjustedStations(told, alone, told=told, below=below, stops=stops)
     collar, *found = directions_of(examined.examination, shared, north)
     moved = moved_stations(examined, below)
-    return AdjustedStations(collar, dict(zip(mds, found, strict=True)), moved, examined.adjusted, told, below, stops)
+    return AdjustedStations(collar, dict(zip(mds, found, strict=True)), moved, examined.drawn, told, below, stops)
 
 
 def fused_alone(station: SurveyStation) -> Direction:
@@ -91,10 +91,10 @@ def fused_alone(station: SurveyStation) -> Direction:
     return station.fused(Weighting.BAYES)
 
 
-def learnt_wander(found: Adjusted, curvature_length: float) -> tuple[LegWander, Array, CollarTie]:
+def learnt_wander(found: Adjusted, curvature_length: float) -> tuple[LegWander, Array, tuple[CollarTie, ...]]:
     """How the path wanders between stations by the curvature that an adjustment has learnt, and each leg's share (s,).
 
-    The last is how the direction at the collar goes with the first leg.
+    The last is how the direction at the collar goes with the first legs.
 
     Parameters
     ----------
@@ -102,4 +102,4 @@ def learnt_wander(found: Adjusted, curvature_length: float) -> tuple[LegWander, 
     """
     driven = found.now.leg_vars / found.now.curvature_var
     driven[:-1] = np.maximum(driven[:-1], driven[1:])  # what bends sharply may have begun above the station
-    return LegWander(math.sqrt(found.now.curvature_var), curvature_length), driven, collar_tie(found)
+    return LegWander(math.sqrt(found.now.curvature_var), curvature_length), driven, collar_ties(found)

@@ -162,7 +162,7 @@ def directions_of(examination: Examination, shared: SharedErrors, north_std: flo
     The encoder's zero against north (rad) turns them all about the vertical and is in no look: it is one more column.
     So is what is suspected: by how much it would move them, as one standard deviation.
     """
-    adjusted = examination.adjusted
+    adjusted = examination.drawn
     bases, tangents = adjusted.bases, adjusted.now.tangents
     own = np.swapaxes(bases, 1, 2) @ adjusted.own_covs[:, :2, :2] @ bases
     turned = north_std * np.stack([-tangents[:, 1], tangents[:, 0], np.zeros(len(tangents))], axis=1)

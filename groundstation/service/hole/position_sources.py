@@ -39,6 +39,7 @@ def _of_directions(
         return dict(zip(KIND_NAMES, np.moveaxis(common, 1, 0), strict=True))
     turned = np.square(drawn.positions[:, 1::-1]) * north_std**2
     north = np.concatenate([turned, np.zeros((len(turned), 1))], axis=1)
+    north += np.diagonal(drawn.swung_covs, axis1=1, axis2=2)
     return {"depth": drawn.shared_depth_vars, "north": north} | examined.position_variances
 
 

@@ -331,6 +331,7 @@ class SurveyedHole:
         self._trajectory = self._drawn_from(self._stands.collar)
         if self._stands.found is not None:
             self._trajectory.bend_as(*learnt_wander(self._stands.found, self._config.curvature_length))
+            self._trajectory.swing_by(north)
         return below
 
     def _fuse(self, since: float) -> list[SurveyStation]:

@@ -9,13 +9,15 @@ Source: Baarda 1968; Teunissen 1990; Pope, NOAA Technical Report NOS 65 (1976), 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
+from groundstation.survey.adjustment.bends_among_holes import bent_as_holes_are
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.collar import collar_departure
 from groundstation.survey.adjustment.hypotheses import BY_DEPTH, KNOWN_SIZE, WIDTHS, Hypothesis, all_hypotheses
@@ -85,7 +87,7 @@ class Blunder:
         return tuple(one.hypothesis for one in both)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # with a dictionary, for what is worked out once
 class Examination:
     """A hole adjusted with all that was found.
 
@@ -102,6 +104,15 @@ class Examination:
     suspicion: Blunder | None = None
     supposed: Adjusted | None = None
 
+    @cached_property
+    def drawn(self) -> Adjusted:
+        """The hole as it is drawn: as ``adjusted``, by how sharply it seems to bend among all holes.
+
+        What is wrong is looked for in a hole that may bend as is usual, so that a blunder is not taken for a bend of a
+        calm one; the ± of its positions is that of this hole.
+        """
+        return bent_as_holes_are(self.adjusted)
+
     @property
     def explained(self) -> Adjusted:
         """The hole with all that was found, the suspicion too."""
@@ -114,7 +125,7 @@ class Examination:
         It is one standard deviation more: most suspicions are none, so none moves a direction.
         """
         off = self.explained.now.tangents - self.adjusted.now.tangents
-        return np.asarray(np.einsum("kai,ki->ka", self.adjusted.bases, off))
+        return np.asarray(np.einsum("kai,ki->ka", self.drawn.bases, off))
 
     @property
     def taken_in(self) -> tuple[Hypothesis, ...]:
@@ -242,7 +253,8 @@ def find_blunder(
     """
     found = now.found
     hypotheses = [one for one in all_hypotheses(looks, run) if one not in known]
-    worth = best_of_kinds([*score_hypotheses(found, run, hypotheses), *_score_of_collar(found, known)], found)
+    chances = [*chances_of(score_hypotheses(found, run, hypotheses), found), *_chance_of_collar(found, known)]
+    worth = best_of_kinds(chances)
     if not worth:
         return None
     many = log_of_level(looks, run)
@@ -266,13 +278,11 @@ def is_plausible(one: Hypothesis, size: Array, run: RunOfStops) -> bool:
     return one.kind not in BY_DEPTH or abs(float(size[0])) <= TUBES_MISCOUNTED * spacing
 
 
-def _score_of_collar(found: Adjusted, known: tuple[Hypothesis, ...]) -> list[Score]:
-    """How well it explains what is left that the collar was told wrong; nothing where that is taken in."""
-    if COLLAR in known:
+def _chance_of_collar(found: Adjusted, known: tuple[Hypothesis, ...]) -> list[tuple[float, Hypothesis]]:
+    """Chance that an honest hole departs as far from its collar, unless it is taken in that this was told wrong."""
+    if COLLAR in known or (chance := collar_departure(found).log_chance()) >= WORTH_TRYING:
         return []
-    off = collar_departure(found)
-    free = np.asarray(np.linalg.pinv(off.cov), np.float64)[None]
-    return [Score((COLLAR,), off.size[None], free, np.array([off.told], np.intp), np.array([off.squares]))]
+    return [(chance, COLLAR)]
 
 
 def chance_of_one(looks: Looks, run: RunOfStops) -> float:
@@ -292,15 +302,20 @@ def log_of_stops(looks: Looks) -> float:
     return math.log(stops * (stops + 1.0))
 
 
-def best_of_kinds(scores: Sequence[Score], found: Adjusted) -> list[Hypothesis]:
-    """The hypotheses that are worth trying: of each kind and subject the best, of them the best few."""
-    best: dict[tuple[object, ...], tuple[float, Hypothesis]] = {}
+def chances_of(scores: Sequence[Score], found: Adjusted) -> Iterator[tuple[float, Hypothesis]]:
+    """Logarithm of the chance that an honest hole shows as much, of each hypothesis that is worth trying."""
     for score in scores:
         chances = log_chances(score.squares, score.told, found.squares, found.redundancy)
         for place in np.flatnonzero(chances < WORTH_TRYING).tolist():
-            one = score.hypotheses[place]
-            about = (one.kind, one.subject)
-            best[about] = min(best.get(about, (0.0, one)), (float(chances[place]), one), key=lambda pair: pair[0])
+            yield float(chances[place]), score.hypotheses[place]
+
+
+def best_of_kinds(chances: Sequence[tuple[float, Hypothesis]]) -> list[Hypothesis]:
+    """The hypotheses that are worth trying: of each kind and subject the best, of them the best few."""
+    best: dict[tuple[object, ...], tuple[float, Hypothesis]] = {}
+    for chance, one in chances:
+        about = (one.kind, one.subject)
+        best[about] = min(best.get(about, (0.0, one)), (chance, one), key=lambda pair: pair[0])
     ranked = sorted(best.values(), key=lambda pair: pair[0])
     ordered = [one for chance, one in ranked if chance <= AS_GOOD * ranked[0][0]]
     first_of_kind = {one.kind: one for one in reversed(ordered)}
@@ -323,9 +338,9 @@ def _tried(
 def _explained(with_one: TakenIn, found: Adjusted, one: Hypothesis, many: float) -> Explanation:
     """What a hypothesis explains, from the likelihood of the looks without and with it."""
     if one == COLLAR:
-        gain = collar_departure(found).squares  # the likelihood is that of the looks, and the collar is in none
-    else:
-        gain = max(0.0, deviance_of(found) - deviance_of(with_one.found))
+        # the likelihood is that of the looks, and the collar is in none
+        return Explanation(one, with_one.sizes[-1], with_one.covs[-1], collar_departure(found).log_chance() + many)
+    gain = max(0.0, deviance_of(found) - deviance_of(with_one.found))
     free = max(1.0, with_one.found.redundancy)
     squares = math.expm1(min(gain / free, 500.0)) * free
     told = np.array([WIDTHS[one.kind]])

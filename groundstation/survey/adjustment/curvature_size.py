@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 HOLE_KNOWN_AS = 6.0  # directions that the size of the hole's curvature before them counts for
 LEG_KNOWN_AS = 4.0  # likewise of one leg, that of the hole: the degrees of freedom of its tails
+OF_LEG = 2.0  # directions that the bend of a leg tells of it, about
+FEWEST_BELOW = 2  # legs that tell how a hole bends without its first
 TOGETHER = 4  # rounds
 LEAST = 1e-12  # rad^2/m^2
 
@@ -35,19 +37,41 @@ def learnt_curvature(found: Adjusted) -> tuple[float, Array]:
     before, legs = found.path.curvature_std**2, found.now.leg_vars
     if not len(legs):
         return before, legs
-    go, rigid = leg_steps(found.path)
-    off = path_departures(found.path, found.now, found.linear.bases, go)
-    seen = np.einsum("ka,kab,kb->k", off, rigid, off)
-    free = off.shape[1] - np.einsum("kab,kba->k", rigid, departure_covs(found, go)) / legs
-    at_collar = found.now.curvatures[0]
-    free_at_collar = 2.0 - float(np.trace(found.covs[0, 2:, 2:])) / found.now.curvature_var
-    known = HOLE_KNOWN_AS * before + float(at_collar @ at_collar)
-    known_as = HOLE_KNOWN_AS + free_at_collar + float(free.sum())
+    seen, free = bends_seen(found)
+    known, known_as = HOLE_KNOWN_AS * before + seen[0], HOLE_KNOWN_AS + float(free.sum())
+    (seen, free) = seen[1:], free[1:]
     whole = found.now.curvature_var
     for _ in range(TOGETHER):
         legs = (LEG_KNOWN_AS * whole + seen) / (LEG_KNOWN_AS + free)
         whole = (known + whole * float(np.sum(seen / legs))) / known_as
     return max(whole, LEAST), np.maximum(legs, LEAST)
+
+
+def bends_seen(found: Adjusted) -> tuple[Array, Array]:
+    """Squares (s + 1,), rad^2/m^2, of the curvature at the collar and of what drives each leg, and directions in each.
+
+    Of holes that bend as was taken they are their variance times these numbers in the mean.
+    """
+    now = found.now
+    go, rigid = leg_steps(found.path)
+    off = path_departures(found.path, now, found.linear.bases, go)
+    of_legs = np.einsum("ka,kab,kb->k", off, rigid, off)
+    free = off.shape[1] - np.einsum("kab,kba->k", rigid, departure_covs(found, go)) / now.leg_vars
+    at_collar = now.curvatures[0]
+    free_at_collar = 2.0 - float(np.trace(found.covs[0, 2:, 2:])) / now.curvature_var
+    return np.append(at_collar @ at_collar, of_legs), np.append(free_at_collar, free)
+
+
+def curvature_below(found: Adjusted) -> float:
+    """Variance (rad^2/m^2) of the curvature of the hole as the legs below the first tell it; of few, as all do."""
+    now, legs = found.now, found.now.leg_vars[1:]
+    if len(legs) < FEWEST_BELOW:
+        return now.curvature_var
+    go, rigid = leg_steps(found.path)
+    off = path_departures(found.path, now, found.linear.bases, go)[1:]
+    told = float(np.sum(np.einsum("ka,kab,kb->k", off, rigid[1:], off) / legs))
+    known = HOLE_KNOWN_AS * found.path.curvature_std**2 + now.curvature_var * told
+    return known / (HOLE_KNOWN_AS + OF_LEG * len(legs))
 
 
 def curvature_deviance(now: StartingPoint, before: float) -> float:

@@ -37,10 +37,11 @@ def is_suspicious(found: Adjusted, run: RunOfStops) -> bool:
 def least_chance(found: Adjusted, run: RunOfStops) -> float:
     """Logarithm of the chance, at most, that an honest hole has any test as unlikely as the worst here."""
     is_whole = len(found.looks) <= MOST_WHOLE
-    tests = [against_prior(found), against_collar(found), *(whole_tests(found, run) if is_whole else late_tests(found))]
+    tests = [against_prior(found), *(whole_tests(found, run) if is_whole else late_tests(found))]
     left, redundancy = (found.squares, found.redundancy) if is_whole else (1e9, 1e9)
     chances = [log_chances(squares, told, left, redundancy) for squares, told in tests]
-    return min(float(np.min(some, initial=0.0)) for some in chances) + math.log(sum(len(some) for some in chances))
+    least = min(collar_departure(found).log_chance(), *(float(np.min(some, initial=0.0)) for some in chances))
+    return least + math.log(1 + sum(len(some) for some in chances))
 
 
 def against_prior(found: Adjusted) -> tuple[Array, Places]:
@@ -55,12 +56,6 @@ def against_prior(found: Adjusted) -> tuple[Array, Places]:
     free = before - np.diag(found.common_cov)[:width]
     is_told = free > LEAST_TOLD * before
     return np.where(is_told, off * off / np.where(is_told, free, 1.0), 0.0), is_told.astype(np.intp)
-
-
-def against_collar(found: Adjusted) -> tuple[Array, Places]:
-    """Squares, of two degrees of freedom, of the collar as it was told against what the stations say of it."""
-    departure = collar_departure(found)
-    return np.array([departure.squares]), np.array([departure.told], np.intp)
 
 
 def whole_tests(found: Adjusted, run: RunOfStops) -> list[tuple[Array, Places]]:

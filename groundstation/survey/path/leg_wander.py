@@ -16,7 +16,9 @@ sigma^2 L^5 / (60 l), and a hole many l long gathers one sixth of it a leg.
 The direction at the collar is in no look. Where the stations tell it better than the crew, it is carried up to the
 collar by the curvature, so what it errs by is the same curvature that the first leg leaves its arc by: a hole that
 begins more to the north than was thought then leaves the arc to the south. Of a hole whose curvature is known at the
-first station and wanders from there up, the two together come to 0.6 L^5 / 12 and not to 1.1 L^5 / 12.
+first station and wanders from there up, the two together come to 0.6 L^5 / 12 and not to 1.1 L^5 / 12. What is known
+there of the curvature is the bend of the second leg, so it goes with what that leaves its arc by too, and less with
+each leg below.
 """
 
 from __future__ import annotations
@@ -72,10 +74,10 @@ class LegWander:
 
 
 class CollarTie(NamedTuple):
-    """How what is not known of the direction at the collar goes with the first leg, each way across the hole.
+    """How what is not known of the direction at the collar goes with a leg, each way across the hole.
 
-    Covariances of that direction with the curvature at the collar (rad^2/m), and with direction and curvature at the
-    first station as they depart from what the collar leads to (rad^2 and rad^2/m).
+    Covariances of that direction with the curvature at the upper end (rad^2/m), and with direction and curvature at the
+    lower end as they depart from what the upper one leads to (rad^2 and rad^2/m).
     """
 
     with_curvature: float
@@ -83,12 +85,12 @@ class CollarTie(NamedTuple):
     with_change: float
 
     def moment_covariance(self, leg: float, share: float, correlation_length: float) -> float:
-        """Covariance (rad m) of the direction at the collar with the moment at a share of the first leg (m)."""
+        """Covariance (rad m) of the direction at the collar with the moment at a share of its leg (m)."""
         gains = moment_gains(round(leg, SAME), round(share, SAME), correlation_length)
         return float(np.dot(gains, self))
 
 
-UNTIED: Final = CollarTie(0.0, 0.0, 0.0)  # a direction at the collar that is known by itself
+UNTIED: Final[tuple[CollarTie, ...]] = ()  # a direction at the collar that is known by itself
 STEADY: Final = LegWander(0.0, 1.0)  # a path that does what its arcs do
 
 
@@ -111,7 +113,7 @@ def arc_moment(leg: float, share: float, correlation_length: float) -> ArcMoment
     return ArcMoment(max(float(variance), 0.0), float(with_start), float(with_end), kept)
 
 
-@lru_cache(maxsize=64)  # only first legs are asked for
+@lru_cache(maxsize=64)  # only the first legs are asked for
 def moment_gains(leg: float, share: float, correlation_length: float) -> Array:
     """Moment (3,) at a share of a leg (m), as its ends tell it: for one unit of each of what `CollarTie` names."""
     to_place, noise = process_step(share * leg, correlation_length)

@@ -31,6 +31,7 @@ from groundstation.survey.path.leg_wander import STEADY, UNTIED, CollarTie, LegW
 from groundstation.survey.well.arcs import on_arc
 from groundstation.survey.well.depth_errors import EXACT, StationDepth
 from groundstation.survey.well.methods import Method
+from groundstation.survey.well.north_swing import inward_covs
 from groundstation.survey.well.trajectory_legs import check_bends, leg_displacements
 from groundstation.survey.well.trajectory_rows import (
     TrajectoryPoint,
@@ -69,7 +70,8 @@ class Trajectory:
     ) -> None:
         self.method = method
         self._wander = wander
-        self._tie = UNTIED
+        self._ties = UNTIED
+        self._north_std = 0.0
         self._driven = NOTHING  # (s,), variance by which each leg is driven over that of the curvature; 1 of the others
         self._keeps_columns = keeps_columns
         first = collar or Direction(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
@@ -214,28 +216,40 @@ class Trajectory:
         if changed:
             self._draw(changed[0])
 
-    def bend_as(self, wander: LegWander, driven: Array, tie: CollarTie = UNTIED) -> None:
+    def bend_as(self, wander: LegWander, driven: Array, ties: Sequence[CollarTie] = UNTIED) -> None:
         """Take another wander of the path, for what is drawn from now on.
 
         Parameters
         ----------
         driven : (s,), of each leg from the collar down the variance by which it is driven over that of the curvature
-        tie : of the direction at the collar with the first leg
+        ties : of the direction at the collar with each of the first legs
         """
-        self._wander, self._driven, self._tie = wander, driven, tie
+        self._wander, self._driven, self._ties = wander, driven, tuple(ties)
+
+    def swing_by(self, north_std: float) -> None:
+        """Take in, for what is drawn from now on, that a north known so well (rad) moves positions on arcs."""
+        self._north_std = north_std
+
+    @property
+    def swung_covs(self) -> Array:
+        """What ``covs`` (n, 3, 3) have of these arcs beyond the way across, m^2."""
+        return inward_covs(self.positions, self._north_std)
 
     @property
     def tied_covs(self) -> Array:
-        """What ``covs`` (n, 3, 3) have of errors of the collar's direction that the first leg undoes, m^2."""
+        """What ``covs`` (n, 3, 3) have of errors of the collar's direction that the first legs undo, m^2."""
         found = np.zeros((len(self), 3, 3))
-        if len(self) > 1:
-            found[1:] = self._tied(float(self.md[1] - self.md[0]), 1.0) * across_of(self._stations.rows["along"][1])
+        for place in range(min(len(self._ties), len(self) - 1)):
+            found[place + 1 :] += self._tied(place, 1.0) * across_of(self._stations.rows["along"][place + 1])
         return found
 
-    def _tied(self, leg: float, share: float) -> float:
-        """Variance each way across the hole, m^2, at a share of the first leg (m) by what both have in common."""
-        weight = 0.5 * leg * share * (2.0 - share)  # of the direction at the collar in a place
-        return 2.0 * weight * self._tie.moment_covariance(leg, share, self._wander.length)
+    def _tied(self, place: int, share: float) -> float:
+        """Variance each way across the hole, m^2, at a share of a leg by what it and the collar have in common."""
+        if place >= len(self._ties):
+            return 0.0
+        first, leg = float(self.md[1] - self.md[0]), float(self.md[place + 1] - self.md[place])
+        weight = 0.5 * first * (1.0 if place else share * (2.0 - share))  # of the direction at the collar in a place
+        return 2.0 * weight * self._ties[place].moment_covariance(leg, share, self._wander.length)
 
     def _moments(self, begin: int, lengths: Array) -> Array:
         """Moments (n, 4) of the path over legs (n,), m, from the one below a place on."""
@@ -281,11 +295,14 @@ class Trajectory:
         driven = float(self._driven[k]) if k < len(self._driven) else 1.0
         moment = moment._replace(variance=driven * moment.variance)
         cov = cov + self._wander.grown(float(upper["memory"]), moment) * across_of(along)
-        cov = cov + (self.tied_covs[k] if k else self._tied(leg, f) * across_of(along))
+        if self._ties:
+            cov = cov + self.tied_covs[k] + self._tied(k, f) * across_of(along)
         for row, own, weight, moved in zip((upper, lower), (k, k + 1), weights, by_depth, strict=True):
             cov = cov + weight**2 * row["own"] + float(row["depth_var"]) * np.outer(moved, moved)
             shared = add_shared_errors(shared, weight * self._stations.tangent_columns(own))
             shared = add_shared_errors(shared, moved[:, None] * self._stations.depths[own].columns.columns())
+        if self._north_std:
+            cov = cov + inward_covs(upper["position"] + place, self._north_std)
         return TrajectoryPoint(md, tangent, upper["position"] + place, cov + shared @ shared.T, shared)
 
     def _sums_at(self, place: int) -> TrajectorySums:
@@ -314,7 +331,9 @@ class Trajectory:
         more = self._go_along(begin, rows, legs)
         followed = self._stations.follow(self._sums, begin, end - 1, with_columns=self._keeps_columns)
         rows["cov"][1:] = followed.covs + more
-        if self._tie is not UNTIED:
+        if self._north_std:
+            rows["cov"][1:] += self.swung_covs[begin + 1 :]
+        if self._ties:
             rows["cov"][1:] += self.tied_covs[begin + 1 :]
         self._sums = followed.sums
         self._marks += followed.marks

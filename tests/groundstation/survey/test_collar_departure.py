@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from blame_table import examined
 from drawn_strings import DEG, DrawnString, draw_string
+from drawn_worlds import Case, draw_worlds
 
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
@@ -50,6 +52,44 @@ def test_a_collar_that_was_told_wrong_is_named_and_counts_no_more() -> None:
     assert "collar" in say_blunder(found.blunders[0], drawn.run, NAMES)
     size = np.linalg.norm(found.blunders[0].best.size) / DEG
     assert size == pytest.approx(off_deg, rel=0.3)
+
+
+def two_looks(drawn: DrawnString) -> DrawnString:
+    """Only what two tubes saw at two stations and one stop: no look contradicts another."""
+    looks, md = drawn.looks.part(np.flatnonzero(drawn.looks.stop == 1)), drawn.path.md[:3]
+    return replace(drawn, looks=looks, path=replace(drawn.path, md=md), run=replace(drawn.run, station_md=md))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_two_looks_that_leave_nothing_contradict_a_collar(seed: int) -> None:
+    """As seed 700362 of the gauntlet: a mount half a degree askew passed for a collar that was six degrees off."""
+    drawn = two_looks(draw_string(seed, tilt_deg=0.5))
+    found = examined(replace(drawn, path=told_off(drawn, 6.0)))
+    named = [one.best.hypothesis.kind for one in (*found.blunders, found.suspicion) if one is not None]
+    assert named == [BlunderKind.COLLAR_WRONG]
+    adjusted = found.adjusted
+    for place in (1, 2):
+        off = adjusted.bases[place] @ drawn.tangents[place]
+        moved = found.suspected[place]
+        assert off @ np.linalg.solve(adjusted.covs[place, :2, :2] + np.outer(moved, moved), off) < 18.4  # 1 in 1e4
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_two_honest_looks_leave_the_collar_in_peace(seed: int) -> None:
+    found = examined(two_looks(draw_string(seed, tilt_deg=0.5)))
+    assert (found.blunders, found.suspicion) == ((), None)
+
+
+@pytest.mark.parametrize("size_deg", [0.15, 0.6])
+def test_a_ground_that_bends_holes_four_times_as_sharply_is_no_collar_told_wrong(size_deg: float) -> None:
+    """The legs below the first tell how sharply: not one of sixty is believed at one in a thousand."""
+    case = Case(seed=31, worlds=60, tubes=4, stations=6, make_ups=4, tilt=0.2, collar=0.15, curvature=size_deg)
+    worlds = draw_worlds(case)
+    path = replace(worlds.path, curvature_std=0.15 * DEG)
+    found = [collar_departure(adjust_hole(worlds.looks(w), worlds.string, path)) for w in range(case.worlds)]
+    chances = np.array([one.log_chance() for one in found])
+    assert np.mean(chances < math.log(1e-4)) <= 1.0 / case.worlds
+    assert np.mean(chances < math.log(0.05)) < 0.5
 
 
 def test_honest_collars_are_left_in_peace() -> None:

@@ -87,7 +87,7 @@ def test_what_the_collar_errs_by_goes_with_the_first_leg_as_on_a_fine_path(case:
 def test_places_of_the_first_leg_are_as_well_known_as_on_a_fine_path(case: tuple[float, float, float]) -> None:
     fine = fine_path(*case)
     drawn = Trajectory(collar=straight_down(fine.between("turn 0", "turn 0")))
-    drawn.bend_as(LegWander(SIZE, fine.length), np.ones(1), fine.tie)
+    drawn.bend_as(LegWander(SIZE, fine.length), np.ones(1), [fine.tie])
     drawn.append(fine.leg, straight_down(fine.between("turn 1", "turn 1")))
     for share in SHARES:
         stated = drawn.at(share * fine.leg).cov
@@ -107,8 +107,8 @@ def test_without_it_a_collar_that_the_stations_tell_counts_too_much() -> None:
 def test_what_is_undone_stays_undone_below() -> None:
     fine = fine_path(2.0, 20.0, 0.15)
     tied, free = (Trajectory(collar=straight_down(fine.between("turn 0", "turn 0"))) for _ in range(2))
-    for drawn, tie in ((tied, fine.tie), (free, UNTIED)):
-        drawn.bend_as(LegWander(SIZE, fine.length), np.ones(4), tie)
+    for drawn, ties in ((tied, [fine.tie]), (free, UNTIED)):
+        drawn.bend_as(LegWander(SIZE, fine.length), np.ones(4), ties)
         for md in (2.0, 4.0, 6.0, 8.0):
             drawn.append(md, straight_down(READ**2))
     np.testing.assert_allclose(tied.covs - tied.tied_covs, free.covs, atol=1e-18)
