@@ -21,10 +21,11 @@ class SteadyTime:
 
     def follow(self, shown: float) -> float:
         """Time (s) that it is when the clock shows ``shown`` (s)."""
-        if shown < self._shown - STEPS_FROM:
+        if shown > self._shown:
+            self._shown = shown
+        elif shown < self._shown - STEPS_FROM:
             self.back += self._shown - shown
             self._shown = shown
-        self._shown = max(self._shown, shown)
         return shown + self.back
 
     def shown_at(self, at: float) -> float:

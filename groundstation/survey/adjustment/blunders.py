@@ -109,9 +109,12 @@ class Examination:
         """The hole as it is drawn: as ``adjusted``, by how sharply it seems to bend among all holes.
 
         What is wrong is looked for in a hole that may bend as is usual, so that a blunder is not taken for a bend of a
-        calm one; the ± of its positions is that of this hole.
+        calm one; the ± of its positions is that of this hole. Where that one has no solution it is as ``adjusted``.
         """
-        return bent_as_holes_are(self.adjusted)
+        try:
+            return bent_as_holes_are(self.adjusted)
+        except (np.linalg.LinAlgError, ArithmeticError):
+            return self.adjusted
 
     @property
     def explained(self) -> Adjusted:
