@@ -18,6 +18,7 @@ SHARPEST = math.radians(1.0)  # rad/m, of a steel string: a circle of 57 m radiu
 READING = math.radians(2.0)  # rad, that two readings over a short leg may differ by
 APART = math.radians(5.0)  # rad, of a station from both its neighbours ...
 ALONE = 3.0  # ... and times the angle between these, from where on it stands alone
+SHARPEST_DESIGN = math.radians(3.0)  # rad/m, that a plan may ask for: a circle of 19 m radius
 LARGEST_RADIUS = 3.0  # m, of a column
 
 
@@ -68,6 +69,20 @@ def _angles(inclination: Array, azimuth: Array, apart: int) -> Array:
     i1, i2, a1, a2 = inclination[:-apart], inclination[apart:], azimuth[:-apart], azimuth[apart:]
     half = np.sin(0.5 * (i2 - i1)) ** 2 + np.sin(i1) * np.sin(i2) * np.sin(0.5 * (a2 - a1)) ** 2
     return np.asarray(2.0 * np.arcsin(np.sqrt(np.clip(half, 0.0, 1.0))))
+
+
+def design_warnings(md: Array, tangents: Array, what: str) -> tuple[EntryWarning, ...]:
+    """Warning of the sharpest bend of a design, tangents (n, 3) at depths (n,), m, where hardly any string follows."""
+    bends = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(np.diff(tangents, axis=0), axis=1), 0.0, 1.0))
+    rates = bends / np.diff(md)
+    k = int(np.argmax(rates))
+    if rates[k] <= SHARPEST_DESIGN:
+        return ()
+    text = (
+        f"{what}: its design bends by {math.degrees(rates[k]):.1f} deg a metre at {md[k]:g} m; "
+        f"expected at most {math.degrees(SHARPEST_DESIGN):g} deg a metre"
+    )
+    return (EntryWarning("dogleg", what, text, float(md[k]), float(md[k + 1])),)
 
 
 def radius_warnings(radius: float, what: str) -> tuple[EntryWarning, ...]:

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.entry.entry_warning import EntryWarning
+from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
 from groundstation.survey.wall.as_built import Columns
@@ -74,10 +75,13 @@ POSITIVE = (
 NOT_NEGATIVE = (
     "radius_cv", "radius_correlation", "head_sigma_m", "unsurveyed_percent", "inclination_deg", "azimuth_deg",
 )  # fmt: skip
+MOST_DEPTH = RANGES["depth"].high
 MOST = {
     "allowed_probability": 0.5, "radius_cv": MOST_RADIUS_CV, "radius_correlation": 1.0, "unsurveyed_percent": 100.0,
     "inclination_deg": 180.0, "azimuth_deg": 360.0, "dip_deg": 90.0, "latitude_deg": 90.0, "declination_deg": 180.0,
-    "convergence_deg": 180.0, "north_of_site_deg": 360.0, "depth_step_m": 2.0,
+    "convergence_deg": 180.0, "north_of_site_deg": 360.0, "depth_step_m": 2.0, "spacing_m": MOST_DEPTH,
+    "length_m": MOST_DEPTH, "tight_from_m": MOST_DEPTH, "tight_to_m": MOST_DEPTH, "head_sigma_m": MOST_DEPTH,
+    REFERENCE_HEIGHT: MOST_DEPTH, **dict.fromkeys(ORIGIN, RANGES["coordinate"].high),
 }  # fmt: skip
 
 

@@ -14,7 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.entry.entry_warning import EntryWarning
-from groundstation.entry.station_plausibility import departing_holes, radius_warnings, station_warnings
+from groundstation.entry.station_plausibility import (
+    departing_holes,
+    design_warnings,
+    radius_warnings,
+    station_warnings,
+)
 from groundstation.survey.wall.column_plans import ColumnPlan, ColumnSurvey
 from groundstation.survey.wall.wall_verdict import Finding, FindingKind
 from groundstation.survey.well.methods import station_tangents
@@ -39,6 +44,8 @@ def wall_warnings(
         found += hole.warnings
         found += radius_warnings(plan.design.radius, plan.design.name)
         found += _depths(plan, hole)
+        if (course := plan.design.plan) is not None:
+            found += design_warnings(course.md, course.tangents, plan.design.name)
         if k in odd:
             found += station_warnings(hole.md, hole.inclination, hole.azimuth, plan.design.name)
             found += _leans(plan, hole)
