@@ -289,7 +289,7 @@ def test_a_head_whose_value_is_none_is_refused(tmp_path: Path, key: str, cell: s
 @pytest.mark.parametrize(
     ("line", "most"),
     [
-        ("tight_to_m = 1e30", 100_000), ("tight_from_m = 1e30", 100_000), ("depth_step_m = 9999", 10),
+        ("tight_to_m = 1e30", 100_000), ("tight_from_m = 1e30", 100_000), ("depth_step_m = 9999", 2),
         ("head_sigma_m = 1e30", 100_000), ("northing_m = 1e30\neasting_m = 0\nheight_m = 0", 1e8),
     ],
 )  # fmt: skip
