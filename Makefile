@@ -92,7 +92,7 @@ planted: kernels  ## plant every listed defect, one at a time, and see whether t
 mutation: kernels  ## change an operator or a number of the pure modules, a sample by a seed, and see whether the tests notice
 	nice -n 10 $(BIN)/python tests/planted/run_mutants.py $(MUTATE)
 
-fuzz: $(STAMP)  ## changed files of every kind that is read, a minute each; FUZZ="tables --seconds 600": some, longer
+fuzz: $(STAMP)  ## changed files of every kind that is read, a minute each group
 	nice -n 10 $(BIN)/python tests/fuzz/run_fuzz.py $(FUZZ)
 
 explore: $(STAMP)  ## the properties with examples that no run before has seen
