@@ -16,6 +16,7 @@ from typing import Any
 import click
 import numpy as np
 import pytest
+from printed_output import cells, printed, wall_result
 
 from borechain import api, setup_check
 from borechain.cli.bench.bench import duration_text
@@ -41,19 +42,6 @@ from telemetry.messages import ENCODER, Event, NodeFlag, Severity
 
 ROOT = Path(__file__).parents[1]
 RECORD = ROOT / "scenarios" / "wellbore-1-path.csv"
-
-
-def printed(show: Any, *given: Any) -> list[str]:
-    """Lines that a command prints."""
-    told = io.StringIO()
-    with contextlib.redirect_stdout(told):
-        show(*given)
-    return told.getvalue().splitlines()
-
-
-def cells(line: str) -> list[str]:
-    """Cells of a row of a printed table."""
-    return [cell.strip() for cell in re.split("[│┃|]", line) if cell.strip()]
 
 
 @pytest.fixture(scope="module")
@@ -105,27 +93,6 @@ def test_a_method_that_is_asked_for_is_used_and_the_site_is_that_of_the_command(
     library = api.survey(RECORD, instrument="GYRO-NS-CT")
     depth = float(library.md[-1])
     np.testing.assert_allclose(library.covariance_at(depth), command.covariance_at(depth), rtol=1e-9)
-
-
-def wall_result(**change: Any) -> dict[str, Any]:
-    """The answer about a wall of three joints and four columns, two of which are beyond their tolerance."""
-    joints = [
-        {"joint": name, "state": "open", "depth_m": 5.0, "thickness_m": thickness, "thinnest_at_m": 4.0,
-         "probability": chance, "moved_apart_cm": 1.0, "direction_deg": 90.0, "tight_from_m": 0.0, "tight_to_m": 9.0}
-        for name, thickness, chance in (("A-B", 0.3, 1e-4), ("B-C", 0.2, 0.3), ("C-D", None, 0.3), ("D-E", 0.1, 0.02))
-    ]  # fmt: skip
-    columns = [{"used_percent": used} for used in (99.9, 100.0, 140.0, None)]
-    closing = [
-        {"day": f"2026-05-{k:02}", "closed_percent": 5.0 * k, "open_joints": 20 - k, "largest_spacing": None}
-        for k in range(1, SHOWN + 4)
-    ]
-    whole = {
-        "verdict": "not tight", "wall": "W", "north": "grid", "stations_north": "grid", "depth_reference": "heads",
-        "joints": joints, "findings": [], "warnings": [], "margin": None, "columns": columns, "closing": closing,
-        "required_thickness_m": 0.25, "gaps": 2, "doubtful": 3, "allowed_probability": 0.01,
-        "probability_of_any": 0.5, "worst": {"joint": "C-D", "depth_m": 5.0}, "extra_columns": [],
-    }  # fmt: skip
-    return whole | change
 
 
 def test_a_wall_prints_the_most_doubtful_joints_first_and_the_newest_days() -> None:

@@ -172,7 +172,8 @@ def alarms_panel(picture: Picture, chosen: int, rows: int) -> Text:
     load = picture.answers.get("alarms", {})
     note = f"  FLOOD, {load['left_out']} more" if load.get("flood") else ""
     lines = [Text(f"ALARMS {len(found)} open{note}".ljust(WIDTH), "bold")]
-    first = max(0, min(chosen, len(found) - 1) - rows + 2)
+    chosen = min(chosen, len(found) - 1)  # those below may have gone since it was chosen
+    first = max(0, chosen - rows + 2)
     for place, alarm in list(enumerate(found))[first : first + rows - 1]:
         lines.append(alarm_row(alarm, is_chosen=place == chosen))
     if not found:
