@@ -20,7 +20,7 @@ help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-20s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 rig:  ## set up, with a bar, and drill wellbore 1
-	@$(MAKE) --no-print-directory --question $(STAMP) > /dev/null 2>&1 || $(PYTHON) deploy/set_up_shown.py $(VENV) $(MAKE) $(STAMP)
+	@$(MAKE) --question $(STAMP) 2> /dev/null || $(PYTHON) deploy/set_up_shown.py $(VENV) $(MAKE) $(STAMP)
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
 
 test:  ## set up and run every check and every test, in parallel
@@ -98,7 +98,7 @@ planted: kernels  ## plant every listed defect, one at a time, and see whether t
 mutation: kernels  ## change an operator or a number of the pure modules, a sample by a seed, and see whether the tests notice
 	nice -n 10 $(BIN)/python tests/planted/run_mutants.py $(MUTATE)
 
-fuzz: $(STAMP)  ## read damaged files of every kind, a minute each
+fuzz: $(STAMP)  ## changed files of every kind that is read, a minute each group
 	nice -n 10 $(BIN)/python tests/fuzz/run_fuzz.py $(FUZZ)
 
 explore: $(STAMP)  ## the properties with examples that no run before has seen

@@ -48,9 +48,9 @@ def measure_shut_out(times: int, endpoint: str, folder: Path) -> dict[str, Any]:
         table.warm()
         for name in specs:
             table.start(name)
-        with drill_string(endpoint, stick, outcome) as crowd, join_person(endpoint, stick, STAYS) as his:
+        with living_string(endpoint, stick, outcome) as crowd, open_person(endpoint, stick, STAYS) as his:
             for name in leaving:
-                with join_person(endpoint, stick, name) as hers:
+                with open_person(endpoint, stick, name) as hers:
                     wait_until(lambda hers=hers: is_answered(hers) and is_answered(his))  # type: ignore[misc]
                     rows.append(time_until_out(hers, his, stick, name, crowd))
     finally:
@@ -67,7 +67,7 @@ def measure_shut_out(times: int, endpoint: str, folder: Path) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def drill_string(endpoint: str, stick: Path, outcome: KillOutcome) -> Iterator[HandedCrowd]:
+def living_string(endpoint: str, stick: Path, outcome: KillOutcome) -> Iterator[HandedCrowd]:
     """A string that hands over one thing after the other, and what it handed over is receipted at the end."""
     with open_client(endpoint, JOIN_S, credentials_of(stick, "encoder")) as bus:
         crowd = HandedCrowd(1, bus, RIG, seals=seals_of(stick, ENCODER, [Side.UPPER]))
@@ -90,7 +90,7 @@ class HandedCrowd(Crowd):
 
 
 @contextlib.contextmanager
-def join_person(endpoint: str, stick: Path, name: str) -> Iterator[ZenohBus]:
+def open_person(endpoint: str, stick: Path, name: str) -> Iterator[ZenohBus]:
     """Session of a person."""
     with open_client(endpoint, JOIN_S, credentials_of(stick, name)) as bus:
         yield bus

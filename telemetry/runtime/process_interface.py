@@ -11,7 +11,7 @@ from telemetry.messages import Side
 from telemetry.runtime.joint_watch import JointFault
 from telemetry.unwritten import Content
 
-OutgoingFrames = list[tuple[Side, PortFrame]]  # each with the end that it leaves by
+SentFrames = list[tuple[Side, PortFrame]]  # by their side
 
 
 class Process:
@@ -49,7 +49,7 @@ class Process:
     def before_frames(self) -> None:
         """Prepare for frames to be taken: put on the disk what must be there before they leave."""
 
-    def take_frames(self, now: float) -> OutgoingFrames:
+    def take_frames(self, now: float) -> SentFrames:
         """Frames to send now."""
         self.before_frames()
         return self.endpoint.take_frames(now)

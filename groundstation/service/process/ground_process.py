@@ -48,7 +48,7 @@ from telemetry.messages import (
 )
 from telemetry.presentation.msgpack_codec import decode_message
 from telemetry.runtime.disk import MACHINE, Disk
-from telemetry.runtime.process_interface import OutgoingFrames, Process
+from telemetry.runtime.process_interface import Process, SentFrames
 from telemetry.runtime.steady_time import SteadyTime
 from telemetry.transport.authentication import read_key
 from telemetry.unwritten import Content
@@ -217,7 +217,7 @@ class GroundProcess(Process):
         due = self._uploads.next_due() if self._uploads is not None else math.inf
         return self._steady.shown_at(min(super().next_wake(self._steady.follow(now)), due))
 
-    def take_frames(self, now: float) -> OutgoingFrames:
+    def take_frames(self, now: float) -> SentFrames:
         """Frames to send now."""
         return super().take_frames(self._steady.follow(now))
 

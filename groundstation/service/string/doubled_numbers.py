@@ -100,7 +100,7 @@ class DoubledNumbers:
         """Number by which the upper of both is known: its own where it was told to be the tube."""
         return tube if self.is_upper.get(tube, False) else OTHER + tube
 
-    def key(self, tube: int, epoch: int, at: float, hops: int) -> int:
+    def key_of(self, tube: int, epoch: int, at: float, hops: int) -> int:
         """Number by which the sender of a message at a rig time (s) is known, so far from the encoder."""
         places = self._in_force(tube, epoch, at)
         if places is None:
@@ -110,12 +110,12 @@ class DoubledNumbers:
 
     def state_apart(self, state: NodeState) -> NodeState:
         """A state under the number by which its tube is known."""
-        key = self.key(state.tube, state.epoch, state.at, state.hops) if self._places else state.tube
+        key = self.key_of(state.tube, state.epoch, state.at, state.hops) if self._places else state.tube
         return state if key == state.tube else replace(state, tube=key)
 
     def survey_apart(self, m: SurveyMeasurement) -> SurveyMeasurement:
         """A measurement under the number by which its tube is known."""
-        key = self.key(m.tube, m.epoch, m.station_at, m.hops) if self._places else m.tube
+        key = self.key_of(m.tube, m.epoch, m.station_at, m.hops) if self._places else m.tube
         return m if key == m.tube else replace(m, tube=key)
 
     def is_held(self, m: SurveyMeasurement) -> bool:
