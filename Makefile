@@ -19,7 +19,8 @@ PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --d
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-20s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-rig: $(STAMP)  ## set up and drill wellbore 1
+rig:  ## set up, with a bar, and drill wellbore 1
+	@$(MAKE) --question $(STAMP) 2> /dev/null || $(PYTHON) deploy/set_up_shown.py $(VENV) $(MAKE) $(STAMP)
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
 
 test:  ## set up and run every check and every test, in parallel
@@ -30,14 +31,19 @@ quick: $(STAMP)  ## lint, types, contracts and the fast tests: under 90 s
 	$(MAKE) --jobs=4 check fast
 
 # the lock is complete, so nothing is left to resolve; uv installs it in a tenth of the time, and where uv finds no index
-# (it does not read pip's settings) pip does. What is imported is compiled then, and the rest never
+# (it does not read pip's settings) pip does. What is imported is compiled then, and the rest never. What compiles kernels
+# comes first: `make rig` has them compiled beside the rest
 LOCKED := --no-deps --require-hashes --requirement
+INSTALL = $(BIN)/uv pip install --python $(BIN)/python --quiet $(LOCKED) $(1) \
+  || $(BIN)/python -m pip install --quiet --no-compile $(LOCKED) $(1)
 $(STAMP): requirements.lock pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	awk '/^[a-z0-9]/ { own = /^uv==/ } own' requirements.lock > $(VENV)/uv.lock
+	awk '/^[a-z0-9]/ { own = /^(numba|llvmlite|numpy)==/ } own' requirements.lock > $(VENV)/compiler.lock
 	$(BIN)/python -m pip install --quiet --no-compile $(LOCKED) $(VENV)/uv.lock
-	$(BIN)/uv pip install --python $(BIN)/python --quiet $(LOCKED) requirements.lock \
-	  || $(BIN)/python -m pip install --quiet --no-compile $(LOCKED) requirements.lock
+	$(call INSTALL,$(VENV)/compiler.lock)
+	touch $(VENV)/.compiler
+	$(call INSTALL,requirements.lock)
 	$(BIN)/python -m pip install --quiet --no-compile --no-build-isolation --no-deps --editable .
 	touch $@
 

@@ -11,6 +11,7 @@ import datetime
 import json
 import math
 import tempfile
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -157,32 +158,45 @@ def survey(
     displacement_rule: str = "exact",
     site: Site | None = None,
     section_azimuth: float = 0.0,
+    hole: str | None = None,
 ) -> Analysis:
     """Trajectory and region of uncertainty of a record of stations or of lateral displacements.
 
     Parameters
     ----------
-    file : CSV of md_m,inclination_deg,azimuth_deg or of md_m,a_cm,b_cm
-    method, instrument, displacement_rule : as the options of ``borechain survey``; the method is that of the record's
-        form where it is None
-    site : gravity, magnetic field and latitude; the default is that of the command
+    file : stations in any format that ``borechain survey`` reads, or displacements
+    method, instrument, displacement_rule, hole : as the options of ``borechain survey``; the method is that of the
+        record's form where it is None
+    site : gravity, magnetic field and latitude; the default is that of the command, and a magnetic instrument has none
     section_azimuth : of the vertical section, rad
+
+    Warns
+    -----
+    UserWarning
+        Of every value that is missing or hardly can be; ``answer_survey`` has them as rows.
 
     Raises
     ------
     SurveyError, ToolError
         When the record or the instrument cannot be used.
     """
-    from groundstation.survey.files.survey_records import DisplacementRule, read_record
+    from groundstation.survey.files.field_files import read_any
+    from groundstation.survey.files.field_table import TableWish
+    from groundstation.survey.files.survey_records import DisplacementRule
+    from groundstation.survey.requests.site_place import known_site
+    from groundstation.survey.requests.survey_answer import magnetic_needs, survey_warnings
+    from groundstation.survey.requests.survey_request import FrameRequest, SiteFigures
     from groundstation.survey.tools.instruments import load_tool
     from groundstation.survey.well.analysis import analyse_survey, default_method
-    from groundstation.survey.well.error_sources import Site
     from groundstation.survey.well.methods import Method
 
-    place = site or Site(9.81, 50_000.0, math.radians(70.0), 0.0, math.radians(52.0))
-    record = read_record(Path(file), DisplacementRule(displacement_rule))
+    tool = load_tool(instrument)
+    place = site or known_site(SiteFigures(), FrameRequest(), magnetic_needs([tool])).figures.to_site()
+    record = read_any(Path(file), DisplacementRule(displacement_rule), TableWish(hole=hole)).record
+    for warning in survey_warnings(record):
+        warnings.warn(f"{file}: {warning.text}", stacklevel=2)
     path = default_method(record) if method is None else Method(method)
-    return analyse_survey(record, path, load_tool(instrument), place, section_azimuth)
+    return analyse_survey(record, path, tool, place, section_azimuth)
 
 
 def answer_survey(request: SurveyRequest) -> SurveyAnswer:

@@ -6,6 +6,7 @@ import click
 
 from groundstation.ground_options import GroundRequest, ground_options
 from groundstation.page_options import PageRequest, page_settings
+from groundstation.plan_settings import plan_warnings
 from telemetry.runtime.command_line import plain_faults, require_modules
 from telemetry.runtime.process_options import PlaceRequest
 
@@ -24,5 +25,7 @@ def ground(request: GroundRequest, place: PlaceRequest, served: PageRequest, clo
     """
     from groundstation.ground_host import run_ground
 
-    own_clock, page = clock == "own", page_settings(served)
-    run_ground(place.to_place(), request.to_settings(), own_clock=own_clock, page=page)
+    own_clock, page, settings = clock == "own", page_settings(served), request.to_settings()
+    for warning in plan_warnings(settings["plan"]):
+        click.echo(f"WARNING ({warning.kind}): {request.plan}: {warning.text}", err=True)
+    run_ground(place.to_place(), settings, own_clock=own_clock, page=page)

@@ -11,8 +11,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from groundstation.entry.entry_warning import EntryWarning
+from groundstation.entry.station_plausibility import design_warnings
 from groundstation.errors import SurveyError
-from groundstation.survey.files.survey_records import read_stations
+from groundstation.survey.files.field_files import read_any
 from groundstation.survey.wall.column_deviation import Tolerance, parse_tolerance
 from groundstation.survey.well.well_plan import PlanLeg, WellPlan
 from telemetry.toml_tables import parse_toml_tables
@@ -141,26 +143,40 @@ def _length_to(number: int, leg: LegSettings, now: tuple[float, float]) -> float
     return found[0]
 
 
+def plan_warnings(settings: PlanSettings | None) -> tuple[EntryWarning, ...]:
+    """What of a plan hardly any string follows; errors as ``PlanSettings.to_plan``."""
+    if settings is None:
+        return ()
+    plan = settings.to_plan()
+    return design_warnings(plan.md, plan.tangents, "the plan")
+
+
 def read_plan(path: Path) -> PlanSettings:
-    """Plan of a file: legs as TOML (tables ``[[leg]]``), or stations as CSV (md_m, inclination_deg, azimuth_deg).
+    """Plan of a file: legs as TOML (tables ``[[leg]]``), or stations in any format that a survey may have.
 
     Raises
     ------
     SurveyError
         One line: the file, what was expected and what came.
     """
-    if path.suffix == ".toml":
-        found = _read_legs(path)
-    else:
-        record = read_stations(path)
-        columns = (record.md, np.degrees(record.inclination), np.degrees(record.azimuth))
-        found = PlanSettings(stations=tuple(zip(*(column.tolist() for column in columns), strict=True)))
+    found = _read_legs(path) if path.suffix == ".toml" else _read_plan_stations(path)
     try:
         found.to_plan()
         found.to_tolerance(Tolerance("", 0.0, 0.0))
     except SurveyError as error:
         raise SurveyError(f"{path}: {error}") from None
     return found
+
+
+def _read_plan_stations(path: Path) -> PlanSettings:
+    """Stations of a design, of which none may be missing: without one it would be another design."""
+    record = read_any(path).record
+    if record.of_displacements:
+        raise SurveyError(f"{path}: expected stations with inclination and azimuth, got displacements")
+    if record.warnings:
+        raise SurveyError(f"{path}: a plan has a value at every station; {record.warnings[0].text}")
+    columns = (record.md, np.degrees(record.inclination), np.degrees(record.azimuth))
+    return PlanSettings(stations=tuple(zip(*(column.tolist() for column in columns), strict=True)))
 
 
 def _read_legs(path: Path) -> PlanSettings:

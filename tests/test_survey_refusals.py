@@ -80,6 +80,25 @@ def wall(folder: Path, heads: str, stations: str, more: str = "") -> Path:
         ("column,north_m,east_m,down_m\nA,0,0,\nB,0,0.7,3\nC,0,1.4,\n", STRAIGHT, "", "B begins at 3 m: it opens at"),
         ("column,north_m,east_m\n", STRAIGHT, "", "expected at least two columns next to each other, got none"),
         (HEADS.replace("1.4", "0"), STRAIGHT, "", "columns A and C are one by their design; expected them apart"),
+        (
+            HEADS,
+            STRAIGHT,
+            "depth_step_m = 5",
+            "depth_step_m: expected at most 2, got 5",
+        ),  # what bulges between is unseen
+        (HEADS, STRAIGHT, "depth_step_m = 1e-5", "expected at most 100000 planes across the columns, got them 1e-05 m"),
+        (
+            "column,north_m,east_m,down_m\nA,0,0,\nB,0,0.7,1e9\n",
+            STRAIGHT[:50],
+            "",
+            "got them 0.5 m apart from 0 to 1e+09 m",
+        ),
+        (
+            "column,north_m,east_m,inclination_deg\nA,0,0,181\n",
+            STRAIGHT,
+            "",
+            "column A: inclination_deg: expected an",
+        ),
         (HEADS, STRAIGHT, "tight_to_m = 12", "column A ends at 10 m; expected a toe at 12 m"),
         (HEADS, STRAIGHT, "grid_scale_factor = 0", "grid_scale_factor: expected a positive number, got 0"),
         ("column,north_m,east_m,radius_m\nA,0,0,-1\nB,0,0.7,\n", STRAIGHT, "", "column A: radius_m: expected a number"),
@@ -165,9 +184,9 @@ def test_a_ring_says_how_it_closed_and_a_grid_how_likely_a_void_is(tmp_path: Pat
     assert "2026-11-20: 100.0 % closed, 0 joints open, widest 0.700 m" in run("wall", path).stdout
     square = "column,north_m,east_m\nA,0,0\nB,0,0.88\nC,0.88,0\nD,0.88,0.88\n"
     stations = STRAIGHT + "D,0,0,0\nD,10,0,0\n"
-    grid = wall(tmp_path, square, stations, 'layout = "grid"\nspacing_m = 0.88\ndepth_step_m = 5\n')
+    grid = wall(tmp_path, square, stations, 'layout = "grid"\nspacing_m = 0.88\ndepth_step_m = 2\n')
     rows = json.loads(run("wall", grid, "--json").stdout)["void_probability"]
-    assert [row["depth_m"] for row in rows] == [0.0, 5.0, 10.0]
+    assert [row["depth_m"] for row in rows] == [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]
     assert all(row["probability"] > 0.9 for row in rows)
     assert rows[0]["area_m2"] > 0.0
     assert rows[0]["place_m"] == pytest.approx([0.44, 0.44])

@@ -14,7 +14,7 @@ from telemetry.runtime.typed_options import Option
 if TYPE_CHECKING:
     from groundstation.report.document import ReportPapers
 
-LANGUAGES = ("en", "de", "fr")
+LANGUAGES = ("en", "de", "es", "fr", "it")
 LARGEST_LOGO = 1 << 20  # bytes
 
 

@@ -27,7 +27,7 @@ LATE = 2.0  # s that the ground station may take to notice a silence, or that a 
 TOLD = frozenset(
     {
         *("survey_missing", "numbers_lost", "numbers_missing", "survey_set_aside", "survey_unplaced"),
-        *("disk", "depth_silent", "depth_refused"),
+        *("disk", "depth_silent", "depth_refused", "same_number"),
     }
 )
 DEPTH = frozenset({"depth_refused", "depth_contradicts"})  # alarms while which no depth since a gap is sure
@@ -220,7 +220,9 @@ def _directions(rig: GauntletRig) -> Iterator[str]:
 def _beyond_reliability(rig: GauntletRig) -> Iterator[str]:
     """Directions that a deception has bent by more than what is stated to be found, without a word of it.
 
-    A blunder of the smallest size that is stated is found four times in five, one of twice that size always.
+    A blunder of the smallest size that is stated is found four times in five, one of twice that size always. That is
+    of a tube's newest stop. What one tube alone has read is its newest stop's where it was read once and last;
+    else the tube may have been bent before, and was compared with nothing.
     """
     found, verdict = rig.inline.ask("adjustment"), rig.inline.ask("verdict")
     if found["blunders"] or set(verdict["doubts"]) - {"setup"}:
@@ -228,10 +230,20 @@ def _beyond_reliability(rig: GauntletRig) -> Iterator[str]:
     steps = [row["smallest_step_mg"] for row in found["tubes"]]
     if not steps or None in steps:
         return  # it is said that nothing can tell
-    for station in rig.inline.ask("stations")["stations"]:
+    stations = rig.inline.ask("stations")["stations"]
+    compared = _compared(rig.inline.ask("measurements")["measurements"], len(stations))
+    for station in stations:
+        if station["station"] not in compared:
+            continue
         off_mg = 1e3 * math.sin(_angle_off(station, rig.world.truth_station(station["md_m"])))
         if off_mg > SURELY_FOUND * max(steps):
             yield f"station at {station['md_m']:.2f} m is off by {off_mg:.0f} mg, {max(steps):.0f} are said to be found"
+
+
+def _compared(rows: list[dict[str, Any]], newest: int) -> set[int]:
+    """Stations that two tubes have read, and the newest where it was read once."""
+    looks = {row["station"]: [one["tube"] for one in rows if one["station"] == row["station"]] for row in rows}
+    return {k for k, tubes in looks.items() if len(set(tubes)) > 1 or (k == newest and len(tubes) == 1)}
 
 
 def _angle_off(one: dict[str, Any], other: dict[str, Any]) -> float:

@@ -27,6 +27,10 @@ STANDARD_GRAVITY = 9.80665  # m/s^2
 DEGREE = math.pi / 180.0
 TURN_TABLE_HEADERS = ("axis,x_pos,x_neg,y_pos,y_neg,z_pos,z_neg", "axis,x_cw,x_acw,y_cw,y_acw,z_cw,z_acw")
 ATTITUDES_HEADER = "position,pitch_deg,roll_deg,ax_mps2,ay_mps2,az_mps2"
+ATTITUDES_HEADERS = {
+    ATTITUDES_HEADER: 1.0,
+    "position,pitch_deg,roll_deg,ax_g,ay_g,az_g": STANDARD_GRAVITY,
+}  # SI of its readings
 FEWEST_ATTITUDES = 4  # unknowns of one sensor axis: its bias and a row of the matrix
 UNIT_TOLERANCE = 0.15  # relative, scale error of a raw sensor and its bias
 WRONG_UNITS = (
@@ -88,15 +92,16 @@ def read_turn_table(path: Path, reference: float, unit: float = 1.0, limit: floa
 
 
 def read_attitudes(path: Path, limit: float = LARGEST) -> Attitudes:
-    """Mean readings of an accelerometer at preset attitudes; ``limit`` (m/s^2) is the full scale.
+    """Mean readings of an accelerometer at preset attitudes, in m/s^2 or g; ``limit`` (m/s^2) is the full scale.
 
     Raises
     ------
     CalibrationError
-        When the file is invalid or too short, a reading is saturated or in g, or the angles are in rad.
+        When the file is invalid or too short, a reading is saturated or in another unit, or the angles are in rad.
     """
-    table = read_table(path, (ATTITUDES_HEADER,))
+    table = read_table(path, tuple(ATTITUDES_HEADERS))
     rows = np.array([table.numbers(k, 1) for k in range(len(table.lines))])
+    rows[:, 2:] *= ATTITUDES_HEADERS[",".join(table.header)]
     for line, row in zip(table.lines, rows, strict=True):
         if abs(row[0]) > 90.0 or abs(row[1]) > 180.0:
             raise line_error(

@@ -18,6 +18,7 @@ from groundstation.entry.null_values import is_null
 from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
+LARGEST_FILE = 64 * 2**20  # bytes of a record of a laboratory
 LARGEST = 1e30  # of a reading; no sensor reaches it, and its square is still a number
 
 
@@ -54,9 +55,12 @@ def line_error(name: str, line: int, expected: str, got: str) -> CalibrationErro
 def read_bytes(path: Path) -> bytes:
     """Content of a file that is neither missing nor empty."""
     try:
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            data = file.read(LARGEST_FILE + 1)
     except OSError as error:
         raise CalibrationError(f"{path.name}: expected a file to read, got {error.strerror}") from error
+    if len(data) > LARGEST_FILE:
+        raise CalibrationError(f"{path.name}: expected a record of at most {LARGEST_FILE // 2**20} MiB, got more")
     if not data.strip():
         raise line_error(path.name, 1, "a record", "an empty file")
     return data

@@ -45,4 +45,7 @@ RANGES = {
     "latitude_deg": QuantityRange("a latitude", -90.0, 90.0, "deg"),
     "longitude_deg": QuantityRange("a longitude", -180.0, 360.0, "deg"),
     "height_m": QuantityRange("a height", -1000.0, 10_000.0, "m"),
+    "coordinate": QuantityRange("a coordinate", -1e8, 1e8, "m"),  # of a national grid, its zone's number before it
+    "distance": QuantityRange("a distance", -1e6, 1e6, "m"),  # on one site
+    "depth": QuantityRange("a depth or a length", -1e5, 1e5, "m"),
 }

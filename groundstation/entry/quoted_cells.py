@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-STARTS = ("=", "+", "-", "@", "\t", "\r")
+STARTS = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
 def quoted_cell(value: object) -> object:

@@ -18,15 +18,13 @@ SHARPEST = math.radians(1.0)  # rad/m, of a steel string: a circle of 57 m radiu
 READING = math.radians(2.0)  # rad, that two readings over a short leg may differ by
 APART = math.radians(5.0)  # rad, of a station from both its neighbours ...
 ALONE = 3.0  # ... and times the angle between these, from where on it stands alone
+SHARPEST_DESIGN = math.radians(3.0)  # rad/m, that a plan may ask for: a circle of 19 m radius
 LARGEST_RADIUS = 3.0  # m, of a column
 
 
 def station_warnings(md: Array, inclination: Array, azimuth: Array, what: str) -> tuple[EntryWarning, ...]:
     """Warnings of stations (n,); m and rad."""
-    bends = _angles(inclination, azimuth, 1)
-    sharp = bends > READING + SHARPEST * np.diff(md)
-    across = _angles(inclination, azimuth, 2)
-    alone = np.minimum(bends[:-1], bends[1:]) > APART + ALONE * across
+    bends, across, sharp, alone = _departures(md, inclination, azimuth)
     found = [
         EntryWarning(
             "spike", what,
@@ -50,11 +48,41 @@ def station_warnings(md: Array, inclination: Array, azimuth: Array, what: str) -
     return tuple(found)
 
 
+def departing_holes(md: Array, inclination: Array, azimuth: Array, hole: npt.NDArray[np.intp]) -> set[int]:
+    """Holes that have a warning of `station_warnings`; of stations (n,) of many, one hole after the other."""
+    _, _, sharp, alone = _departures(md, inclination, azimuth)
+    same = hole[1:] == hole[:-1]
+    return {*hole[1:][sharp & same].tolist(), *hole[1:-1][alone & same[1:] & same[:-1]].tolist()}
+
+
+def _departures(
+    md: Array, inclination: Array, azimuth: Array
+) -> tuple[Array, Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """Angles between neighbours (n - 1,) and across each (n - 2,), rad; which legs are sharp, which stations alone."""
+    bends, across = _angles(inclination, azimuth, 1), _angles(inclination, azimuth, 2)
+    sharp = bends > READING + SHARPEST * np.diff(md)
+    return bends, across, sharp, np.minimum(bends[:-1], bends[1:]) > APART + ALONE * across
+
+
 def _angles(inclination: Array, azimuth: Array, apart: int) -> Array:
     """Angles (n - apart,) between stations so many apart, rad."""
     i1, i2, a1, a2 = inclination[:-apart], inclination[apart:], azimuth[:-apart], azimuth[apart:]
     half = np.sin(0.5 * (i2 - i1)) ** 2 + np.sin(i1) * np.sin(i2) * np.sin(0.5 * (a2 - a1)) ** 2
     return np.asarray(2.0 * np.arcsin(np.sqrt(np.clip(half, 0.0, 1.0))))
+
+
+def design_warnings(md: Array, tangents: Array, what: str) -> tuple[EntryWarning, ...]:
+    """Warning of the sharpest bend of a design, tangents (n, 3) at depths (n,), m, where hardly any string follows."""
+    bends = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(np.diff(tangents, axis=0), axis=1), 0.0, 1.0))
+    rates = bends / np.diff(md)
+    k = int(np.argmax(rates))
+    if rates[k] <= SHARPEST_DESIGN:
+        return ()
+    text = (
+        f"{what}: its design bends by {math.degrees(rates[k]):.1f} deg a metre at {md[k]:g} m; "
+        f"expected at most {math.degrees(SHARPEST_DESIGN):g} deg a metre"
+    )
+    return (EntryWarning("dogleg", what, text, float(md[k]), float(md[k + 1])),)
 
 
 def radius_warnings(radius: float, what: str) -> tuple[EntryWarning, ...]:

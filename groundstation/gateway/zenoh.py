@@ -202,6 +202,10 @@ class ZenohGateway:
         if not keys.is_order(query.selector_key):
             query.finish()  # a question that covers every key orders nothing
             return
+        if "*" in query.selector_key:
+            own = keys.COMMAND.format(rig=self._rig, name="NAME")
+            refuse_query(query, f"{query.selector_key}: expected one rig and one order, {own}; none was obeyed")
+            return
         name = query.selector_key.rsplit("/", 1)[1]
         try:
             order = self._operator.order(name, query.parameters, query.parameters.get("by", WHO))

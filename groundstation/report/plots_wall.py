@@ -165,7 +165,7 @@ def _thickness(
     axes.axvline(required, color=INK, lw=1.0, ls=(0, (6, 2)), label=f"required, {required:g} m")
     axes.set(xlabel="Thickness of the joint (m)", title="Worst joints")
     axes.set_ylim(float(columns.depths[-1]), float(columns.depths[0]))
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.19), ncols=2)
 
 
 def _missing_words(columns: Columns, found: Joints, joint: int) -> str:
@@ -211,8 +211,8 @@ def _map(axes: Axes, columns: Columns, found: Joints, required: float, allowed: 
     step = -(-count // 16)
     axes.set_xticks(range(0, count, step), [joint_name(columns, found, k) for k in range(0, count, step)], rotation=90)
     notes = [*(["crossed: missing"] if missing else []), *(["hatched: not surveyed"] if unsurveyed else [])]
-    more = ";\n" + "; ".join(notes) if notes else ""
-    axes.set(title=f"All joints (ring: the worst{more})")
+    marks = ";\n".join(["ring: the worst", *notes])
+    axes.set(title=f"All joints ({marks})")
     bar = axes.figure.colorbar(picture, ax=axes, location="bottom", spacing="uniform", label=label, aspect=30, pad=0.02)
     bar.ax.set_xticks(bounds, [f"{b:.2g}" for b in bounds])
 

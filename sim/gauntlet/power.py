@@ -166,7 +166,10 @@ def same_number(random: np.random.Generator, begin: float, end: float) -> list[S
         rig.cut(tube)
         rig.start(tube)
 
-    return [Step(off, change), Step(on, change_back)]
+    def tell(rig: Faulty) -> None:
+        rig.order("same_number", {"tube": str(number), "which": "upper" if number > tube else "lower"})
+
+    return [Step(off, change), Step(on, change_back), Step(on, tell)]
 
 
 def freeze_process(random: np.random.Generator, begin: float, end: float) -> list[Step]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from groundstation.survey.files.survey_records import DisplacementRule, read_displacements
+from groundstation.survey.files.survey_records import DisplacementRule, read_record
 from groundstation.survey.well.well_record import SurveyRecord
 
 AXES = ("north", "east", "tvd")
@@ -20,7 +20,7 @@ def data_file(name: str) -> Path:
 
 def wellbore_1(rule: DisplacementRule = DisplacementRule.EXACT) -> SurveyRecord:
     """Field record of thesis Table 4.1."""
-    return read_displacements(data_file("wellbore_1.csv"), rule)
+    return read_record(data_file("wellbore_1.csv"), rule)
 
 
 @dataclass(frozen=True, slots=True)

@@ -319,9 +319,15 @@ COMMANDS: tuple[CommandSpec, ...] = (
         action="check",
     ),
     CommandSpec(
+        "same_number",
+        ObeyedBy.GROUND,
+        "tells which of two tubes that give themselves one number is the tube; the other one is not used",
+        (_argument("which", TEXT, "of both", choices=("upper", "lower"), needed=True),),
+    ),
+    CommandSpec(
         "setup",
         ObeyedBy.GROUND,
-        "takes the newest of north, collar, joint, length, stick-up and their checks back that still stands",
+        "takes back what was told last and stands: north, collar, joint, length, stick-up, same number, or a check",
         action="undo",
     ),
 )

@@ -92,7 +92,7 @@ class Endpoint:
         self._sync_side = None if is_clock_root else toward_encoder
         links = self._links.get(Side.UPPER), self._links.get(Side.LOWER)
         self.mail = EndToEndDelivery(address, boot_count, *links, self.counters, seals)
-        self._passes_states = False  # whether a state is in the frame that is looked at
+        self._passed: set[int] = set()  # tubes whose states are in the frame that is looked at
         self._hello_at = -math.inf
         self._sync_at = -math.inf
         self._standstill = Standstill()
@@ -150,8 +150,8 @@ class Endpoint:
                 continue
             if message is not None:
                 received.append(Received(message, side))
-        if self._passes_states:
-            self._passes_states = False
+        if self._passed:
+            self._passed.clear()
             self._links[Side.UPPER].release()
             self.mail.go_with_states(now)
         return received
@@ -324,8 +324,10 @@ class Endpoint:
         if (link := self._links.get(Side.UPPER)) is None:
             self.counters["nowhere_to_go"] += 1
             return
-        link.send_best_effort(payload, (MessageKind.NODE_STATE, tube), Priority.STATE)
-        self._passes_states = True
+        # a second state of one number in a frame is another tube's, which the ground station is to hear of
+        topic = (MessageKind.NODE_STATE, tube, tube in self._passed or tube == self.address)
+        self._passed.add(tube)
+        link.send_best_effort(payload, topic, Priority.STATE)
 
     @property
     def _upper(self) -> int | None:

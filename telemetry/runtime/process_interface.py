@@ -11,6 +11,8 @@ from telemetry.messages import Side
 from telemetry.runtime.joint_watch import JointFault
 from telemetry.unwritten import Content
 
+SentFrames = list[tuple[Side, PortFrame]]  # by their side
+
 
 class Process:
     """Base of a process: hands time and frames to its ``endpoint``; a subclass takes what it can use of the rest.
@@ -47,7 +49,7 @@ class Process:
     def before_frames(self) -> None:
         """Prepare for frames to be taken: put on the disk what must be there before they leave."""
 
-    def take_frames(self, now: float) -> list[tuple[Side, PortFrame]]:
+    def take_frames(self, now: float) -> SentFrames:
         """Frames to send now."""
         self.before_frames()
         return self.endpoint.take_frames(now)

@@ -86,15 +86,23 @@ AWAY = st.lists(st.tuples(st.floats(0.0, 60.0), st.floats(0.2, 20.0)), max_size=
 
 
 @settings(deadline=None, max_examples=300)
-@given(SLEEPS, AWAY)
+@given(SLEEPS, AWAY, st.booleans())
 def test_two_act_at_once_no_longer_than_a_lease_is_valid_and_one_is_left(
-    sleeps: list[tuple[int, float, float]], away: list[tuple[float, float]]
+    sleeps: list[tuple[int, float, float]], away: list[tuple[float, float]], are_of_one_age: bool
 ) -> None:
     """Each tries to take the rig while it has no lease; both look every half second unless they sleep.
 
     One that has slept never acts beside its follower. Where the router forgets a holder that is awake, another may come
     in between; the holder finds that out when its lease lapses, or the other when the router knows the holder again.
+    Nothing of it changes where all leases are of one age, by clocks that stand or were restored.
     """
+    with pytest.MonkeyPatch.context() as clock:
+        if are_of_one_age:
+            clock.setattr("groundstation.gateway.lease.time.time_ns", lambda: 1_800_000_000_000_000_000)
+        live_with_leases(sleeps, away)
+
+
+def live_with_leases(sleeps: list[tuple[int, float, float]], away: list[tuple[float, float]]) -> None:
     router = MadeRouter()
     sessions = [MadeSession(router), MadeSession(router)]
     leases: list[RigLease | None] = [None, None]

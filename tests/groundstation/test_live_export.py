@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -141,6 +142,17 @@ def test_covariances_are_those_that_clients_are_answered(page: PageClient) -> No
         assert matrix.variance_evert.value == point["covariance_m2"][1][2]
 
 
+def test_the_deviation_is_that_of_the_deepest_station(page: PageClient) -> None:
+    """The hole is designed vertical: its toe deviates by where the last of its places lies."""
+    *_, last = csv.DictReader(page.get("/api/tables/trajectory.csv").body.decode().splitlines())
+    text = page.get(f"/api/exports/hole.diggs?{PLACE}").body.decode()
+    found = re.search(r"tipDeviationNorth (\S+) m, tipDeviationEast (\S+) m", text)
+    assert found
+    assert abs(float(last["north_m"])) + abs(float(last["east_m"])) > 0.05
+    for told, name in zip(found.groups(), ("north_m", "east_m"), strict=True):
+        assert float(told) == pytest.approx(float(last[name]), abs=2e-3)
+
+
 def test_every_validator_accepts_a_live_file(page: PageClient, tmp_path: Path) -> None:
     says = {"dxf": dxf_says, "geojson": geojson_says, "ifc": ifc_says, "witsml": witsml_says}
     for form, check in says.items():
@@ -166,7 +178,7 @@ def test_who_may_not_read_may_not_export(served: tuple[Served, PageClient]) -> N
         ("hole.geojson", 409, "geojson: expected --grid-crs and --origin"),
         ("hole.dxf?grid_crs=EPSG:25833", 409, "--grid-crs: expected --origin NORTHING EASTING HEIGHT"),
         ("hole.dxf?origin=1,2", 409, "--origin: expected NORTHING,EASTING,HEIGHT in m, got '1,2'"),
-        ("hole.dxf?origin=1,nan,2", 409, "--origin: expected three numbers"),
+        ("hole.dxf?origin=1,nan,2", 409, "--origin: expected a coordinate of -1e+08..1e+08 m, got nan"),
         ("hole.dxf?depth=3", 400, "parameter depth: expected one of origin, grid_crs"),
         (f"hole.geojson?{PLACE.replace('25833', '99999')}", 409, "EPSG:99999"),
     ],

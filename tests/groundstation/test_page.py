@@ -58,7 +58,7 @@ def test_every_key_is_answered_over_http_by_the_schema_of_the_bus(page: PageClie
     schemas = page.get("/api/schema").content["schemas"]
     numbers = {"nodes/{tube}": "1", "stations/{n}": "2", "stations/{n}/measurements": "2"}
     assert page.sign_in().status == 200
-    order = page.post("/api/cmd/accept_depth", {"action": "confirm"}).content["order"]
+    order = page.post("/api/cmd/accept_joints", {"action": "confirm"}).content["order"]
     for pattern in PATTERNS:
         number = numbers.get(pattern, str(order))
         answer = page.get("/api/" + re.sub(r"\{[a-z]+\}", number, pattern))
@@ -157,7 +157,7 @@ def test_a_driller_orders_and_the_course_is_on_the_key(page: PageClient) -> None
 def test_an_order_of_another_page_is_refused(page: PageClient) -> None:
     assert page.sign_in().status == 200
     own = f"http://127.0.0.1:{page.port}"
-    order = ("/api/cmd/accept_depth", {"action": "confirm"})
+    order = ("/api/cmd/accept_joints", {"action": "confirm"})
     assert page.post(*order, origin=own).status == 200
     assert page.post(*order, origin="http://evil.example").status == 403
     assert page.post(*order, **{"sec-fetch-site": "cross-site"}).status == 403

@@ -115,7 +115,7 @@ def test_a_word_opens_its_own_role_and_name_alone(page: Page, role: str, name: s
 def test_only_a_driller_orders_by_the_token_of_the_session_and_in_its_own_name(page: Page) -> None:
     _, driller, _ = page.sign_in("driller", "ben", WORDS["driller"])
     _, operator, _ = page.sign_in("operator", "cora", WORDS["operator"])
-    told = {"action": "tell", "angle_deg": 12.3456789, "sigma_deg": 1.5, "by": "somebody"}
+    told = {"action": "tell", "angle_deg": 12.3456789, "sigma_deg": 1.5, "by": "a stranger"}
     for headers, status in (
         ({}, 401), (operator, 403), (driller | {"x-csrf-token": "x"}, 403), ({"cookie": driller["cookie"]}, 403),
         (driller | {"x-csrf-token": operator["x-csrf-token"]}, 403), (driller | {"origin": "http://other"}, 403),

@@ -12,7 +12,7 @@ from string_passes import knowing, survey
 
 from groundstation.config import GroundConfig, checked_config
 from groundstation.errors import ConfigurationError, SurveyError
-from groundstation.plan_settings import LegSettings, PlanSettings, read_plan
+from groundstation.plan_settings import LegSettings, PlanSettings, plan_warnings, read_plan
 from sim.rig.ground_settings import ground_settings
 from sim.world.scenario import scenario_of
 from sim.world.world import World
@@ -98,6 +98,59 @@ def test_stations_with_a_gap_or_a_missing_file_are_refused(tmp_path: Path) -> No
     for name in ("none.toml", "none.csv"):
         with pytest.raises(SurveyError, match=name):
             read_plan(tmp_path / name)
+
+
+STATIONS = ((0.0, 0.0, 0.0), (10.0, 0.0, 0.0), (40.0, 60.0, 0.0))
+
+
+FORMS = {
+    "a.csv": b"\xef\xbb\xbfMD (ft);Azi (deg);Inc (deg)\r\n0;0;0\r\n"
+    b"32.808398950131235;0;0\r\n131.23359580052494;0;60\r\n",
+    "b.txt": "pit wall\n# MD\tINCL\tAZIM\nm\tgon\tgon\n0\t0\t0\n10\t0\t-999.25\n40\t66.6666666666667\t0\n".encode(
+        "utf-16"
+    ),
+    "c.las": b"~V\nVERS. 2.0:\nWRAP. NO:\n~W\nNULL. -999.25:\n~C\nDEPT.M:\nDEVI.DEG:\nAZIM.DEG:\n"
+    b"~A\n0 0 0\n10 0 0\n40 60 0\n",
+}
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_a_plan_is_read_like_any_survey(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(FORMS[name])
+    np.testing.assert_allclose(read_plan(path).stations, STATIONS, atol=1e-9)
+    assert plan_warnings(read_plan(path)) == ()  # 2 deg a metre
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ("0,0,0\n10,-999.25,0\n40,60,0\n", "a plan has a value at every station; line 3: inclination_deg = '-999.25'"),
+        ("0,0,0\n10,5,9999\n40,60,0\n", "a plan has a value at every station; line 3: azimuth_deg = '9999'"),
+        ("0,0,0\n10,5,\n40,60,0\n", "a plan has a value at every station"),
+        ("0,0,0\n10,5,1005\n", "line 3: azimuth_deg: expected an azimuth of -720..720 deg, got 1005"),
+        ("0,0,0\n10,nan,0\n", "line 3: expected a finite inclination_deg, got nan"),
+    ],
+)
+def test_a_plan_with_a_value_that_is_none_is_refused(tmp_path: Path, rows: str, message: str) -> None:
+    path = tmp_path / "plan.csv"
+    path.write_text("md_m,inclination_deg,azimuth_deg\n" + rows)
+    with pytest.raises(SurveyError) as refused:
+        read_plan(path)
+    assert message in str(refused.value)
+    path.write_text("md_m,a_cm,b_cm\n0,0,0\n2,1,1\n")
+    with pytest.raises(SurveyError, match="expected stations with inclination and azimuth, got displacements"):
+        read_plan(path)
+
+
+@pytest.mark.parametrize("typed", ["12.3", "123"])
+def test_a_plan_that_no_string_follows_is_a_warning(tmp_path: Path, typed: str) -> None:
+    """A decimal point that was forgotten bends the design by 111 deg in 30 m."""
+    path = tmp_path / "plan.csv"
+    path.write_text(f"md_m,inclination_deg,azimuth_deg\n0,12,90\n30,12,90\n60,{typed},90\n90,12.4,90\n")
+    told = [warning.text for warning in plan_warnings(read_plan(path))]
+    word = "the plan: its design bends by 3.7 deg a metre at 30 m; expected at most 3 deg a metre"
+    assert told == ([] if typed == "12.3" else [word])
 
 
 def test_settings_that_are_no_plan_are_refused_where_they_enter(tmp_path: Path) -> None:

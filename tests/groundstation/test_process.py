@@ -116,6 +116,19 @@ async def test_a_selector_that_covers_everything_orders_nothing_and_ends_nobody(
     assert it.ground.endpoint.counters["failed_queries"] == 0
 
 
+@pytest.mark.parametrize("rigs", ["*", "**", "rig-*", "$*"])
+async def test_an_order_to_every_rig_is_refused_in_a_line_and_obeyed_by_none(
+    rig: tuple[Rig, ZenohBus], rigs: str
+) -> None:
+    it, bus = rig
+    selector = f"borechain/{rigs}/cmd/accept_joints?action=confirm"
+    replies = await asyncio.to_thread(bus.get, selector.replace("rig-*", "rig-$*"), 10.0)
+    assert all("expected one rig and one order" in str(reply.error) for reply in replies)
+    assert len(replies) == (0 if rigs == "**" else 1)  # whose third part may be anything
+    assert (await ask(bus, f"{GROUND}/orders"))["orders"] == []
+    assert not it.ground.operator.has_pending
+
+
 async def test_a_range_answers_only_the_range(rig: tuple[Rig, ZenohBus]) -> None:
     _, bus = rig
     assert [p["md_m"] for p in (await ask(bus, f"{GROUND}/trajectory"))["points"]] == [0.0, 2.0, 4.0]
@@ -417,7 +430,7 @@ async def test_an_order_waits_for_nobody_and_its_course_is_published(
 ) -> None:
     it, bus = rig
     with watching(bus, f"{GROUND}/orders/*") as seen:
-        silent = asyncio.create_task(ask(bus, "borechain/*/cmd/take_survey?tube=2;by=anna"))
+        silent = asyncio.create_task(ask(bus, "borechain/rig-1/cmd/take_survey?tube=2;by=anna"))
         live = asyncio.create_task(ask(bus, "borechain/rig-1/cmd/parameters?tube=1"))
         orders: list[Any] = []
         while len(orders) < 2:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from forked_commands import run
+from matplotlib.text import Text
 from test_reports import DAY, write_wall
 
 from borechain import api
@@ -18,6 +19,7 @@ from groundstation.report.certificate import Identity, template_data, typeset_pn
 from groundstation.report.column_report import column_report
 from groundstation.report.document import Document, Origin, ReportPapers, document_content, report_pages, report_pdf
 from groundstation.report.hole_report import HolePapers, hole_report
+from groundstation.report.plots_wall import draw_wall
 from groundstation.report.wall_report import column_records, site_of, wall_report
 from groundstation.report.word_tables import known_languages, word_table
 from groundstation.survey.requests.survey_request import SurveyRequest
@@ -31,6 +33,7 @@ DATA = Path(__file__).parents[1] / "data" / "calibration"
 # what is the same in another language, names of the test, and names of models, methods and sources
 SAME = {
     "de": "Revision Software sigma", "fr": "Document Site Joints joint Date vertical source Stations attitude sigma",
+    "es": "Software sigma vertical", "it": "Software sigma",
 }  # fmt: skip
 NAMES = {
     "North pit wall", "Station square, lot 3", "Bohr and Sons", "City railways", "Station to Station",
@@ -96,6 +99,22 @@ def texts(content: Any) -> Iterator[str]:
                 yield from texts(part)
 
 
+def test_no_title_of_a_picture_is_cut(tmp_path: Path) -> None:
+    """A wall with missing and unsurveyed columns has the longest."""
+    wall = read_wall(write_wall(tmp_path))
+    figure = draw_wall(wall, judge_wall(wall))
+    figure.canvas.draw()
+    titles = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().startswith("All joints")]
+    assert [title.get_text() for title in titles] == [
+        "All joints (ring: the worst;\ncrossed: missing;\nhatched: not surveyed)"
+    ]
+    for title in titles:
+        extent = title.get_window_extent()
+        assert extent.x0 >= 0.0
+        assert extent.x1 <= figure.bbox.x1
+        assert extent.y1 <= figure.bbox.y1
+
+
 @pytest.mark.parametrize("language", OTHERS)
 def test_no_english_phrase_is_left(made: Any, language: str) -> None:
     english = [text for one in made("en") for text in texts(document_content(one))]
@@ -146,6 +165,10 @@ def test_a_hole_has_a_report_of_its_own(made: Any) -> None:
     assert (north, east) == (pytest.approx(-0.558, abs=2e-3), pytest.approx(0.833, abs=2e-3))
     assert down < 30.0
     sections = {section.title: section for section in hole.sections}
+    stds_mm = [float(cell) for cell in sections["Stations"].rows[-1][-3:]]  # one sigma, rounded to 0.1 mm
+    for half, std_mm in zip((2, 4, 6), stds_mm, strict=True):
+        assert std_mm > 1.0
+        assert 1e3 * float(found[half]) == pytest.approx(1.959964 * std_mm, abs=0.7)
     assert dict(sections["Instrument"].facts)["Calibration"] == "not stated"
     assert [row[0] for row in sections["Stations"].rows] == ["0.00", "10.00", "20.00", "30.00"]
     assert hole.good
@@ -175,7 +198,7 @@ def test_the_tables_have_the_phrases_of_each_other() -> None:
     tables = [word_table(language) for language in OTHERS]
     known = [{*table._exact, *(pattern.pattern for pattern, _ in table._patterns)} for table in tables]
     assert all(words == known[0] for words in known)
-    with pytest.raises(SurveyError, match="--language: expected one of de, en, fr, got 'xx'"):
+    with pytest.raises(SurveyError, match="--language: expected one of de, en, es, fr, it, got 'xx'"):
         word_table("xx")
 
 

@@ -220,6 +220,26 @@ def test_a_hole_comes_to_its_toe_wherever_that_lies_between_two_planes(tmp_path:
     assert planes[0] < planes[-1]  # what shows the wall asks for it anew then
 
 
+@pytest.mark.parametrize("name", ["vertical", "raked", "horizontal", "planned"])
+def test_nothing_that_is_said_changes_between_the_planes_that_are_told(tmp_path: Path, name: str) -> None:
+    """The hole is drilled on its design while nothing is surveyed; a layer thinner than a step has a plane too."""
+    case = replace(CASES[name], keys="[[layer]]\nfrom_m = 3.1\nradius_m = 0.7\n[[layer]]\nfrom_m = 3.3\n")
+    holes = {other: surveyed(case, other, 0.0) for other in case.heads}
+    own = holes.pop(case.own)
+    live = LiveWall(written(tmp_path, case, holes, with_covs=True), case.own)
+    assert own.covs is not None
+    begun = ColumnSurvey(own.md[:2], own.inclination[:2], own.azimuth[:2], covs=own.covs[:2])
+    said: dict[int, set[tuple[str, ...]]] = {}
+    for bit in np.arange(STEP + 0.02, LENGTH + 0.01, 0.07):
+        now = live.judged(begun, float(bit))
+        assert now.judgement is not None
+        assert now.wall.built.ends[now.own] == bit  # which is told anew however little it has moved
+        told = tuple(finding.text for finding in now.judgement.findings if "is missing from" in finding.text)
+        said.setdefault(live.plane_of(float(bit)), set()).add(told)
+    assert [len(texts) for texts in said.values()] == [1] * len(said)
+    assert len(said) >= 12  # half a metre apart, and two of layers
+
+
 def test_own_covariances_are_used(tmp_path: Path) -> None:
     """Twice as uncertain, and the probability of a thin joint follows."""
     case = CASES["vertical"]

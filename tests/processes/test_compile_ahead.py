@@ -84,3 +84,52 @@ def test_every_kernel_of_a_node_has_its_parts() -> None:
 
     assert set(KERNELS) <= PARTS_OF.keys()
     assert PARTS.keys() == ABOUT.keys()
+
+
+SET_UP = REPOSITORY / "deploy" / "set_up_shown.py"
+
+
+@pytest.fixture
+def venv(tmp_path: Path) -> Path:
+    """What a new environment has when its compiler is there."""
+    (tmp_path / "venv" / "bin").mkdir(parents=True)
+    python = tmp_path / "venv" / "bin" / "python"
+    python.write_text(f'#!/bin/sh\nexec {sys.executable} "$@"\n')
+    python.chmod(0o755)
+    return tmp_path / "venv"
+
+
+@pytest.mark.timeout(600)
+def test_kernels_are_compiled_beside_an_installation_and_stages_are_told(cache: Path, venv: Path) -> None:
+    """The installation waits for a kernel that only the compiler beside it brings."""
+    waits = f"touch {venv}/.compiler; until ls {cache}/{LACKING}/*.nbc; do sleep 0.1; done"
+    done = run(cache, str(SET_UP), str(venv), "sh", "-c", waits)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.splitlines() == ["installing packages, once", "compiling kernels, once"]
+    assert run(cache, "-c", PROGRAM, "float64").stdout.split() == ["True", "0", "0"]
+
+
+def test_a_failed_installation_says_what_it_said_and_compiles_nothing(cache: Path, venv: Path) -> None:
+    (venv / ".compiler").touch()  # of the environment before
+    done = run(cache, str(SET_UP), str(venv), "sh", "-c", "echo no package; exit 3")
+    assert done.returncode == 3
+    assert done.stderr.splitlines() == ["installing packages, once", "no package", f"setting up {venv} failed"]
+    assert not (cache / LACKING).exists()
+
+
+def test_a_terminal_sees_a_bar_while_nothing_is_there_yet(venv: Path, tmp_path: Path) -> None:
+    import pty
+
+    os.mkfifo(tmp_path / "go")
+    ours, theirs = pty.openpty()
+    begun = subprocess.Popen([sys.executable, SET_UP, venv, "cat", tmp_path / "go"], stderr=theirs)
+    shown = b""
+    while b"s  installing packages" not in shown:
+        shown += os.read(ours, 1000)
+    assert shown.startswith(b"\r[")
+    assert begun.poll() is None
+    (tmp_path / "go").write_text("")
+    assert begun.wait() == 0
+    assert os.read(ours, 100000).endswith(b"\r\x1b[K")
+    os.close(theirs)
+    os.close(ours)

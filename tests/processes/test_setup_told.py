@@ -12,7 +12,7 @@ import pytest
 from rigs import REPOSITORY, Rig, run, running_rig
 
 pytestmark = pytest.mark.process
-GROUND, ORDER = "borechain/*/ground", "borechain/*/cmd"
+GROUND, ORDER = "borechain/*/ground", "borechain/rig-1/cmd"
 NORTH_DEG = 30.0
 
 

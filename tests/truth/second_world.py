@@ -246,14 +246,18 @@ class SecondWorld:
 
     def _exact(self, values: Array, ends: Array) -> tuple[Array, Array, Array, Array]:
         """Means over the cycles and their eighths as their time stamps have them, and that nothing is late."""
-        stamps, nothing = np.concatenate([[ends[0] - PERIOD], ends]), np.zeros(len(ends))
-        stamps = stamps + 1e-3 * self.what.jitter_ms * self.random.standard_normal(len(stamps))
+        stamps, nothing = self._read_times(ends), np.zeros(len(ends))
         fine = np.interp(np.arange(8 * len(ends) + 1) / 8.0, np.arange(len(stamps)), stamps)
         summed = np.stack([np.interp(fine, self.t, integral(v)) for v in values.T], axis=1)
         parts = np.pad((np.diff(summed[:, 2]) / np.diff(fine)).reshape(-1, 8), ((0, 0), (1, 0)))
         if not self.what.increments:
             parts[:] = np.nan
         return np.diff(summed[::8], axis=0) / np.diff(stamps)[:, None], nothing, nothing, parts
+
+    def _read_times(self, ends: Array) -> Array:
+        """When a sensor is really read (m + 1,), s, whose node believes the ``ends`` of its cycles."""
+        stamps = np.concatenate([[ends[0] - PERIOD], ends])
+        return stamps + 1e-3 * self.what.jitter_ms * self.random.standard_normal(len(stamps))
 
     def _in_frames(self, values: Array, ends: Array) -> tuple[Array, Array, Array, Array]:
         """Means of the frames that a driver finds in a cycle, how late it says they are (s), its error, their parts."""
@@ -272,7 +276,7 @@ class SecondWorld:
         frames = frames + white * self.random.standard_normal(frames.shape)
         clock, mean, late = FrameClock(what.frames_hz), np.zeros((len(ends), 6)), np.zeros((len(ends), 2))
         parts = np.full((len(ends), 9), np.nan)
-        borders = np.searchsorted(at, np.concatenate([[ends[0] - PERIOD], ends]), side="right")
+        borders = np.searchsorted(at, self._read_times(ends), side="right")
         for k, end in enumerate(ends):
             clock.on_read(float(end), int(borders[k + 1] - borders[k]))
             found, shown = frames[borders[k] : borders[k + 1]], clock.end - delay

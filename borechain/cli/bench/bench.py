@@ -21,6 +21,7 @@ OWN = {
     "page": "load",
     "day": "load",
     "learn": "load",
+    "doors": "load",
     "killed": "load",
     "hour": "hour_command",
 }  # and the module of each
@@ -72,6 +73,7 @@ def bench(context: click.Context) -> None:
       borechain bench page
       borechain bench day --hours 24
       borechain bench learn
+      borechain bench doors
       borechain bench killed --times 200
       borechain bench hour
     """

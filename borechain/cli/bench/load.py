@@ -1,4 +1,4 @@
-"""``borechain bench page``, ``day``, ``learn`` and ``killed``: a ground station under load, of a long past, killed."""
+"""``borechain bench page``, ``day``, ``learn``, ``doors``, ``killed``: a ground station loaded, old, beset, killed."""
 
 from __future__ import annotations
 
@@ -102,6 +102,36 @@ def day(hours: float, tubes: int, address: str, endpoint: str, as_json: bool) ->
     click.echo(f"page opened: {result['picture_ms']:.0f} ms until the history has come; {again}")
     click.echo(latency_line("an earlier moment", result["moment_ms"]))
     click.echo(f"memory: {result['private_mb']:.0f} MB")
+
+
+@click.command()
+@click.option("--half-open", type=click.IntRange(0, 5000), default=400, show_default=True, help="Connections.")
+@click.option("--streams", type=click.IntRange(0, 1000), default=64, show_default=True, help="That are not read.")
+@click.option("--wrong", type=click.IntRange(0, 1000), default=150, show_default=True, help="Wrong passwords at once.")
+@click.option("--asks", type=click.IntRange(2, 10_000), default=100, show_default=True, help="Of who is signed in.")
+@page_option
+@endpoint_option("Where its router listens.")
+@json_option
+@require_modules("orjson", "rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
+@plain_faults
+def doors(half_open: int, streams: int, wrong: int, asks: int, address: str, endpoint: str, as_json: bool) -> None:
+    """Beset the door of a page, and measure how long who is signed in waits for an answer.
+
+    \b
+    Example:
+      borechain bench doors --half-open 400 --streams 64 --wrong 150
+    """
+    from borechain.load.doors import Siege, measure_doors
+
+    served = free_page(address, endpoint)
+    with tempfile.TemporaryDirectory(prefix="borechain-") as folder:
+        siege = Siege(half_open, streams, wrong, asks)
+        result: dict[str, Any] = {"bench": "doors"} | measure_doors(siege, endpoint, served, Path(folder))
+    if as_json:
+        click.echo(json.dumps(result))
+        return
+    click.echo(latency_line("answers while the door is free", result["free_ms"]))
+    click.echo(latency_line("answers while it is beset", result["answer_ms"]))
 
 
 @click.command()

@@ -91,7 +91,7 @@ def csv_of(answers: list[QueryReply]) -> str:
     Raises
     ------
     InputFault
-        When there are several answers, or the one has no rows.
+        When there are several answers, or the one has no rows, or is none of a ground station.
     """
     from groundstation.errors import SelectorError
     from groundstation.service.answers.answer_table import find_answer
@@ -99,11 +99,14 @@ def csv_of(answers: list[QueryReply]) -> str:
 
     if len(answers) != 1:
         raise InputFault(f"--csv: expected one answer, got {len(answers)}: {', '.join(one.key for one in answers[:5])}")
-    path = answers[0].key.partition("/ground/")[2]
+    key, payload = answers[0].key, answers[0].payload
+    path = key.partition("/ground/")[2]
     try:
-        return table_of(path, find_answer(path).fields, json.loads(answers[0].payload))
+        return table_of(path, find_answer(path).fields, json.loads(payload))
     except SelectorError as error:
         raise InputFault(f"--csv: {error}") from error
+    except (ValueError, LookupError, TypeError) as error:
+        raise InputFault(f"--csv: {key}: expected rows of a ground station, got {bytes(payload)!r:.60}") from error
 
 
 @click.command()

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from borechain.cli.faults import plain_faults
+from borechain.cli.pki.signing import sign, verify
 from telemetry import keys
 from telemetry.messages import MAX_TUBE
 from telemetry.runtime.command_line import InputFault
@@ -38,7 +39,13 @@ def pki() -> None:
       borechain pki rotate
       borechain pki retire
       borechain pki password driller --file passwords
+      borechain pki sign K021.pdf --certificate stick/anna.pem
+      borechain pki verify K021.pdf --authority stick/ca.pem
     """
+
+
+pki.add_command(sign)
+pki.add_command(verify)
 
 
 @pki.command()

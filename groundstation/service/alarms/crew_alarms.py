@@ -22,6 +22,7 @@ CLEARED_KEPT = 200
 DELAYS = {Level.NOTICE: 0.0, Level.DEGRADED: 10.0, Level.BAD: 0.0}  # s, own clock, that a condition stands before
 AGAIN_WITHIN = 60.0  # s, own clock, within which a condition that returns is the same alarm
 SETTLED_AFTER = 30.0  # s, own clock, after a start before what was known is taken for gone
+STEPS_BACK = 60.0  # s by which a date may be put right without a word
 HOUR, TEN_MINUTES = 3600.0, 600.0
 FLOOD_FROM, FLOOD_UNTIL = 10, 5  # alarms raised within ten minutes
 
@@ -137,7 +138,22 @@ class CrewAlarms:
             else:
                 self._open[alarm.condition.key] = alarm
         self._quiet = {one.key: one.level for one in conditions if one.key not in self._open}
+        dates = [
+            date for one in (*self._open.values(), *self.cleared) for date in (one.since_utc, one.acknowledged_utc)
+        ]
+        self.utc = max((date for date in dates if math.isfinite(date)), default=-math.inf)
         self._is_restored = True
+
+    def follow_date(self, utc: float) -> float:
+        """Seconds by which the date is before one that was; what is shelved comes back as much earlier. Else 0."""
+        back = self.utc - utc
+        if not STEPS_BACK < back < math.inf:
+            return 0.0
+        for alarm in list(self._open.values()):
+            if alarm.shelved_by:
+                self._change(replace(alarm, shelved_until=alarm.shelved_until - back))
+        self.utc = utc
+        return back
 
     def update(self, conditions: Iterable[Condition], times: Times) -> None:
         """Take what is wrong now."""

@@ -54,11 +54,17 @@ KINDS: tuple[AlarmKind, ...] = (
     AlarmKind("numbers_lost", DEGRADED, "messages of a tube will not come: the tube no longer has them"),
     AlarmKind("tube_counts_anew", NOTICE, "a tube has lost its memory and numbers its messages from the beginning"),
     AlarmKind("tube_restarted", NOTICE, "a tube has started again"),
+    AlarmKind(
+        "same_number",
+        BAD,
+        "two tubes give themselves one number: nothing of either is fused until it is told which of them it is",
+    ),
     AlarmKind("tube_silent", DEGRADED, "a tube of the string has not been heard for too long"),
     AlarmKind("tube_sensor", DEGRADED, "a tube flags a sensor or its yaw"),
     AlarmKind("tube_disk", DEGRADED, "a tube cannot save its state; a cut now loses what came since"),
     AlarmKind("tube_queue", NOTICE, "a queue of a tube was full and dropped something"),
     AlarmKind("clock", BAD, "a tube's rig time is ahead of the ground station's, or of another epoch"),
+    AlarmKind("clock_back", NOTICE, "clock or date of the ground station's machine stepped back, as of a restored one"),
     AlarmKind("epoch", NOTICE, "the encoder has started again: rig time counts anew"),
     AlarmKind(
         "reference",

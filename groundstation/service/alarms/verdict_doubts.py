@@ -29,6 +29,7 @@ ALARMS = {
     "depth_silent": VerdictDoubt.STALE,
     "clock": VerdictDoubt.CLOCK,
     "lease": VerdictDoubt.STALE,
+    "same_number": VerdictDoubt.SETUP,
 }
 
 

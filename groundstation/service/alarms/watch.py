@@ -68,6 +68,7 @@ class Watch:
         self._gaps: dict[int, Gap] = {}
         self._cross_check = EncoderCrossCheck()
         self._told_unplaced: set[int] = set()  # tubes
+        self._doubled: set[int] = set()  # numbers that two tubes give themselves, as told
         self._told_back: set[float] = set()  # m, stations that turn back
         self._blamed: set[str] = set()  # subjects of what was found to be wrong with the hole
         self._depth_due = math.inf  # s, own clock, since when tubes are known and a depth may be expected
@@ -81,6 +82,7 @@ class Watch:
         self._looked_at = now
         self._alarms.advance(now, self._time.rig_now)
         self._look_at_nodes()
+        self._look_at_doubled()
         self._look_at_encoder()
         self._look_at_belt()
         self._look_at_depth(now)
@@ -95,6 +97,8 @@ class Watch:
         hold("tube_disk", tube, "its disk refuses" if NodeFlag.NOT_SAVED in state.flags else "")
         hold("clock", tube, self._clock_fault(state))
         self._look_at_joint(state)
+        if state.tube in self._string.doubled:
+            return  # what both have numbered comes under one number
         if self._numbers.on_told(state.tube, state.numbered):
             self._alarms.alert("tube_counts_anew", tube, f"newest number {state.numbered}")
 
@@ -168,7 +172,7 @@ class Watch:
     def gaps_to_ask(self, now: float) -> list[tuple[int, Range]]:
         """Tubes and ranges that are to be asked for at ``now`` (s, own clock)."""
         asked = []
-        for tube in self._numbers.tubes:
+        for tube in [one for one in self._numbers.tubes if one not in self._string.doubled]:
             gap = self._gap_of(tube, now)
             if gap is None or now < gap.found_at + GAP_AFTER or now < gap.asked_at + ASK_EVERY:
                 continue
@@ -239,6 +243,17 @@ class Watch:
         for tube in self._string.tubes:
             silent = "silent" if math.isfinite(self._states.age(tube)) else "not heard since the ground station started"
             self._alarms.hold("tube_silent", f"tube {tube}", silent if self._states.is_stale(tube) else "")
+
+    def _look_at_doubled(self) -> None:
+        """Tell which two tubes have one number, until it is told which of them is the tube."""
+        doubled = self._string.doubled
+        for tube in self._doubled - set(doubled.untold):
+            self._alarms.clear("same_number", f"tube {tube}")
+        for tube in doubled.untold:
+            places, upper = doubled.newest(tube), doubled.upper_of(tube)
+            two = f"tube {places.upper} from the top, shown as tube {upper}, and tube {places.lower} from the top"
+            self._alarms.hold("same_number", f"tube {tube}", f"{two}; see the command same_number")
+        self._doubled = set(doubled.untold)
 
     def _look_at_encoder(self) -> None:
         if not self._string.knows_tubes:

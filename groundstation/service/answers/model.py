@@ -51,6 +51,7 @@ class RigModel:
         """
         string, shared = KnownString(config), SharedErrors()
         setup = SetupBook(config)
+        string.doubled = setup.doubled
         hole = SurveyedHole(config, shared, setup)
         return cls(
             config=config,

@@ -81,8 +81,9 @@ class LiveWall:
 
     def plane_of(self, bit: float | None) -> int:
         """Number that grows where a bit (m) has passed one more plane, and where it has come to the toe."""
-        md = bit or 0.0
-        return int(md / self._wall.file.assumed.step) + (md >= self._wall.plans[self._own].design.length - TOE)
+        md, design, built = bit or 0.0, self._wall.plans[self._own].design, self._wall.built
+        depth = float(design.points_at(np.array([md]))[0] @ built.frame[2])
+        return int(np.searchsorted(built.columns.depths, depth + TOE, "right")) + (md >= design.length - TOE)
 
     def _judge(self, survey: ColumnSurvey, bit: float) -> Neighbourhood:
         file, own = self._wall.file, self._own

@@ -71,7 +71,7 @@ class Placement:
             return []  # the usual case: called at every reading
         waiting, self.waiting, placeable = self.waiting, [], []
         for one in waiting:
-            md = self._string.depth_of(one.message, one.below)
+            md = self._string.depth_of(self._setup.doubled.survey_apart(one.message), one.below)
             if md is None:
                 self.waiting.append(one)
             else:
@@ -86,7 +86,7 @@ class Placement:
         None for each that is not fused.
         """
         fused, above, below, places, depths = [], [], [], [], []
-        for place, m in enumerate(measurements):
+        for place, m in enumerate(map(self._setup.doubled.survey_apart, measurements)):
             if trust_of(m.flags) not in NEVER_FUSED:
                 chain = self._string.tally.above(m.tube, m.hops)
                 fused.append(corrected_measurement(m, chain, self._setup))
@@ -108,6 +108,8 @@ class Placement:
         """Give the hole what a measurement came to; returns the kind of alarm where it is not used as it is, or ''."""
         if unused := self._unused(measurement):
             return unused
+        if self._setup.doubled.is_held(measurement):
+            return ""  # it is told as an alarm of its own, once
         if found is None:
             self.refused += 1
             return "survey_refused"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import math
 import secrets
 import time
@@ -25,6 +26,8 @@ from groundstation.service.process.intake_tape import DEPTH, MESSAGE, ORDER, TIM
 from groundstation.service.process.learner import Learner
 from groundstation.service.process.operator_access import BlockUpload, OperatorAccess, Outgoing
 from groundstation.service.setup.setup_items import shown_marks
+from groundstation.service.setup.told_value import SetupKind, ToldValue
+from groundstation.service.string.doubled_numbers import NumberWatch
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seal_watch import SealWatch, refusal_of
 from telemetry.errors import DecodeError
@@ -45,7 +48,8 @@ from telemetry.messages import (
 )
 from telemetry.presentation.msgpack_codec import decode_message
 from telemetry.runtime.disk import MACHINE, Disk
-from telemetry.runtime.process_interface import Process
+from telemetry.runtime.process_interface import Process, SentFrames
+from telemetry.runtime.steady_time import SteadyTime
 from telemetry.transport.authentication import read_key
 from telemetry.unwritten import Content
 
@@ -87,6 +91,7 @@ class GroundProcess(Process):
     config : validated settings
     lot : number below its argument by lot; a simulated rig draws from its seed
     disk : that holds the database
+    date : of this machine, UTC, s since 1970
     run_apart : does something beside everything else, such as the search for what is wrong with the hole: by a clock of
         its own no question is to wait for it; without it what is answered is the same at the same step every time
 
@@ -104,6 +109,7 @@ class GroundProcess(Process):
         lot: Callable[[int], int] = secrets.randbelow,
         disk: Disk = MACHINE,
         *,
+        date: Callable[[], float] = time.time,
         run_apart: RunApart | None = None,
     ) -> None:
         self.config = config
@@ -130,9 +136,11 @@ class GroundProcess(Process):
             self._certificates = CertificateWatch(config.keys, model.rig_alarms)
         self.clock: RigClock = self.endpoint.clock
         self.tape = Tape()
+        self._steady, self._told_back, self._date = SteadyTime(), 0.0, date
         self.start_number = start
         self.listeners: list[Listener] = []
         self._stale: set[int] = set()
+        self._numbers_watch = NumberWatch()
         self._early: deque[DepthReading] = deque(maxlen=EARLY)
         self._setup_marks: tuple[object, ...] = ()  # of the setup as it was published
         self._beat_at = -math.inf
@@ -149,6 +157,7 @@ class GroundProcess(Process):
 
     def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
         """A frame arrived from the encoder."""
+        now = self._steady.follow(now)
         if now - self._string.time.now > HEARTBEAT:
             self._advance_time(now)  # it stood still: what it knew then must not be shown as of now
         self._send_pending(now)
@@ -161,6 +170,7 @@ class GroundProcess(Process):
 
     def on_depth(self, payload: bytes, now: float) -> None:
         """The rig measured the depth of the bit; bytes that are no reading are counted."""
+        now = self._steady.follow(now)
         self._keep_arrived()
         seals = self.endpoint.seals
         content = payload if seals is None else seals.depth_content(payload)
@@ -185,6 +195,7 @@ class GroundProcess(Process):
 
     def on_timer(self, now: float) -> None:
         """Advance to ``now``: orders and uploads, hello, time requests, repetition, and what is wrong by now."""
+        now = self._steady.follow(now)
         self._keep_arrived()
         if self.watch.is_due(now) or self._early:
             self._note(TIMER, now)
@@ -204,13 +215,18 @@ class GroundProcess(Process):
         if self.operator.has_pending:
             return now
         due = self._uploads.next_due() if self._uploads is not None else math.inf
-        return min(super().next_wake(now), due)
+        return self._steady.shown_at(min(super().next_wake(self._steady.follow(now)), due))
+
+    def take_frames(self, now: float) -> SentFrames:
+        """Frames to send now."""
+        return super().take_frames(self._steady.follow(now))
 
     def bar(self, trouble: str, now: float) -> None:
         """Tell the crew why nothing is taken in from now on, or by an empty text that it is again; nothing is kept."""
         self.operator.barred = trouble
         self.model.rig_alarms.hold("lease", GROUND_STATION, trouble)
-        self.model.crew_alarms.update(self._conditions(), Times(now, self._string.time.rig_now, time.time()))
+        now = self._steady.follow(now)
+        self.model.crew_alarms.update(self._conditions(), Times(now, self._string.time.rig_now, self._date()))
         self.model.revisions.on_event()
         self._publish(["alarms", "status", "verdict"])
 
@@ -263,6 +279,10 @@ class GroundProcess(Process):
             self._publish(consequences)
         self.watch.look(now)
         alarms, refusal = self.model.rig_alarms, self.store.refusal
+        if (back := self._steady.back) > self._told_back:
+            what = f"it stepped back by {back - self._told_back:.1f} s; times go on from where they were"
+            alarms.alert("clock_back", "clock", what)
+            self._told_back = back
         alarms.hold("disk", "database", refusal)
         alarms.hold("database", "database", f"{self.store.damaged} messages" if self.store.damaged else "")
         dropped = self.endpoint.dropped
@@ -298,8 +318,11 @@ class GroundProcess(Process):
 
     def _tell_crew(self, now: float) -> None:
         """Follow what is wrong with the alarms that the crew works with, and keep them."""
-        alarms = self.model.crew_alarms
-        alarms.update(self._conditions(), Times(now, self._string.time.rig_now, time.time()))
+        alarms, utc = self.model.crew_alarms, self._date()
+        if back := alarms.follow_date(utc):
+            what = f"the date of its machine is {back:.0f} s before one that was"
+            self.model.rig_alarms.alert("clock_back", "date", what)
+        alarms.update(self._conditions(), Times(now, self._string.time.rig_now, utc))
         if changed := alarms.drain_changed():
             with refusing_disk():
                 self.store.keep_alarms(changed)
@@ -347,6 +370,9 @@ class GroundProcess(Process):
         """A message has come, from the string or from a recording."""
         self._note(MESSAGE, now, message)
         self._advance_time(now)
+        if isinstance(message, NodeState):
+            self._find_doubled(message)
+            message = self._string.doubled.state_apart(message)
         match message:
             case NodeState() if self._string.on_state(message, now):
                 self.model.recalibration.on_state(message)
@@ -364,6 +390,18 @@ class GroundProcess(Process):
             case BlockStatus():
                 self.operator.on_block_status(message)
         self.operator.publish_orders()
+
+    def _find_doubled(self, state: NodeState) -> None:
+        """Write down that two tubes give themselves one number, so that it stands until one of them is told."""
+        found, setup = self._numbers_watch.find_places(state), self.model.setup
+        if found is None or (state.tube in setup.doubled and setup.doubled.newest(state.tube).is_same(found)):
+            return
+        values = (float(found.epoch), found.at, float(found.upper), float(found.lower))
+        utc = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
+        entry = ToldValue(setup.next_number(), SetupKind.DOUBLED, str(state.tube), values, 1.0, GROUND_STATION, utc)
+        with refusing_disk():
+            self.store.keep_told(entry)
+        setup.add([entry])
 
     def _keep_arrived(self) -> None:
         """Store and learn what came together before any of it is acknowledged."""

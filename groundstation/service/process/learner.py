@@ -51,8 +51,9 @@ class Learner:
         """A message has come, to be stored with those that come beside it, a measurement with the depth it has now."""
         md = below = None
         if isinstance(message, SurveyMeasurement):
-            below = self._string.length_below(message)
-            md = None if below is None else self._string.depth_of(message, below)
+            apart = self._string.doubled.survey_apart(message)
+            below = self._string.length_below(apart)
+            md = None if below is None else self._string.depth_of(apart, below)
         self._arrived.append(Stored(message, md, below))
 
     def learn_arrived(self) -> tuple[list[Kept], list[str]]:
@@ -172,8 +173,9 @@ class Learner:
             some = placed[begin : begin + RESTORED_TOGETHER]
             found = self._placement.resolve_measurements([m for m, _ in some], [md for _, md in some])
             for (measurement, _), stop in zip(some, found, strict=True):
-                if stop is not None:
+                if stop is not None and not self._string.doubled.is_held(measurement):
                     self._hole.add_stop(*stop, self._string.epoch_of(measurement))
+        self._string.on_doubled()
         self._followed = version
         self._hole.catch_up()
         self.find_consequences()
@@ -194,7 +196,7 @@ class Learner:
             for place, one in enumerate(some):
                 if place in placed:
                     measurement = placed[place][0]
-                    self._setup.on_flags(measurement.tube, measurement.hops, measurement.flags)
+                    self._on_flags(measurement)
                     self._string.numbers.add_number(one.message.tube, one.message.sequence)
                     self._place(placed[place][0], found[place])
                 else:
@@ -216,12 +218,17 @@ class Learner:
                 self._recalibration.on_static_record(message)
                 return ("static_records",)
             case SurveyMeasurement():
-                self._setup.on_flags(message.tube, message.hops, message.flags)
-                self._string.on_measurement(message, is_placed=False)
+                self._on_flags(message)
+                self._string.on_measurement(self._string.doubled.survey_apart(message), is_placed=False)
                 self._watch.on_measurement(message, self._placement.wait_for_depth(Stored(message, one.md, one.below)))
                 return self._by_survey
 
+    def _on_flags(self, measurement: SurveyMeasurement) -> None:
+        """Learn from a measurement which angles its node was told."""
+        apart = self._string.doubled.survey_apart(measurement)
+        self._setup.on_flags(apart.tube, apart.hops, apart.flags)
+
     def _place(self, measurement: SurveyMeasurement, found: Found | None) -> None:
         """Give the hole what a measurement was resolved to."""
-        self._string.on_measurement(measurement, is_placed=True)
+        self._string.on_measurement(self._string.doubled.survey_apart(measurement), is_placed=True)
         self._watch.on_measurement(measurement, self._placement.place(measurement, found))

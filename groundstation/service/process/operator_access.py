@@ -41,7 +41,8 @@ ANSWERED_WITHIN = 900.0  # s, own clock, after which an order that no tube has a
 NO_KEY = "key_file: expected the key file of the rig, without it no node takes a block"
 LONGEST_NAME = 64  # characters, of who orders
 UPLOAD = "upload_parameters"
-SETUP_COMMANDS = ("north", "collar", "joint", "length", "stick_up", "setup")
+SETUP_COMMANDS = ("north", "collar", "joint", "length", "stick_up", "same_number", "setup")
+DOUBTS_OF_DEPTH = ("depth_refused", "depth_contradicts")  # alarms, after which a crew measures the depth again
 RECALIBRATION = "recalibration"  # who orders what the calibration in the field asks for
 
 
@@ -199,7 +200,16 @@ class OperatorAccess:
         self.changed(["recalibration"])
 
     def accept_depth(self, order: SentOrder) -> None:
-        """Believe the depth that comes from now on."""
+        """Believe the depth that comes from now on; one that nothing speaks against is not to be accepted blindly.
+
+        Raises
+        ------
+        SelectorError
+            When the depth neither jumped nor is refused, and contradicts nothing.
+        """
+        stands = self._model.rig_alarms.stands
+        if not (self._string.depths.jumped or any(stands(code, "depth") for code in DOUBTS_OF_DEPTH)):
+            raise SelectorError("accept_depth: expected a depth that jumped or is refused, nothing speaks against it")
         self._string.depths.accept()
         self._model.rig_alarms.clear("depth_refused", "depth")
         order.advance(OrderState.DONE)

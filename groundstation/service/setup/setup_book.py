@@ -19,6 +19,7 @@ from groundstation.service.setup.told_value import (
     ToldValue,
     item_name,
 )
+from groundstation.service.string.doubled_numbers import DoubledNumbers, DoubledPlaces
 from telemetry.messages import NodeFlag
 
 UNTOLD_BITS = int(NodeFlag.LOWER_UNTOLD | NodeFlag.DRIVE_UNTOLD)
@@ -38,6 +39,7 @@ class SetupBook:
     joints, lengths : what stands of the joints, and of the tubes
     north, stick_up : angle (rad) and height (m) that stand; zero where none does
     moves_depths : whether lengths or the stick-up were told
+    doubled : numbers that two tubes give themselves
     version : grows with everything by which surveys mean something else
     revision : grows with everything that is entered, or that a node says anew of what it was told
     """
@@ -51,6 +53,7 @@ class SetupBook:
         self.lengths: dict[int, ToldValue] = {}
         self.north = self.stick_up = 0.0
         self.moves_depths = False
+        self.doubled = DoubledNumbers()
         self._lowers: dict[int, bool] = {}  # by tube, whether its node was told the angle of the joint below it
         self._drives: dict[int, bool] = {}  # and that of the joint to the drive head, of each that hung from it
         self._lacked: set[int] = set()  # tubes whose joint below was not told once, less than zero: to the drive head
@@ -73,9 +76,10 @@ class SetupBook:
         return self.entries[-1].number + 1 if self.entries else 1
 
     def newest(self) -> ToldValue | None:
-        """The entry that would be taken back; None where none stands."""
+        """The entry that would be taken back; None where none stands. What was found is not taken back."""
         gone = {entry.takes_back for entry in self.entries}
-        kept = (entry for entry in reversed(self.entries) if not entry.takes_back and entry.number not in gone)
+        told = (entry for entry in reversed(self.entries) if entry.kind is not SetupKind.DOUBLED)
+        kept = (entry for entry in told if not entry.takes_back and entry.number not in gone)
         return next(kept, None)
 
     def add(self, entries: Iterable[ToldValue]) -> None:
@@ -98,6 +102,10 @@ class SetupBook:
         self.stick_up = 0.0 if stick_up is None else stick_up.values[0]
         self.lengths = {int(told.subject): told for told in standing if told.kind is SetupKind.LENGTH}
         self.moves_depths = bool(self.lengths) or self.stick_up != 0.0
+        self.doubled.begin_anew(
+            [(int(entry.subject), places_of(entry)) for entry in self.entries if entry.kind is SetupKind.DOUBLED],
+            {int(told.subject): bool(told.values[0]) for told in standing if told.kind is SetupKind.SAME_NUMBER},
+        )
 
     def on_flags(self, tube: int, hops: int, flags: NodeFlag) -> None:
         """A node says, in a state or a measurement, which angles it was not told."""
@@ -128,6 +136,12 @@ class SetupBook:
         """Joints that surveys rest on: those of the string (tubes from the top down), and each to the drive head."""
         tops = [*tubes[:1], *(tube for tube in tubes[1:] if tube in self._drives)]
         return [*((DRIVE, tube) for tube in tops), *pairwise(tubes)]
+
+
+def places_of(entry: ToldValue) -> DoubledPlaces:
+    """Places of a doubled number, as they were found."""
+    epoch, at, upper, lower = entry.values
+    return DoubledPlaces(int(epoch), at, int(upper), int(lower))
 
 
 def pair_of(subject: str) -> Pair:

@@ -17,7 +17,11 @@ VALUES: Final = {  # arguments that hold what an order tells
     SetupKind.JOINT: ("angle",),
     SetupKind.LENGTH: ("length",),
     SetupKind.STICK_UP: ("height",),
+    SetupKind.SAME_NUMBER: ("which",),
 }
+
+OF_TUBES: Final = (SetupKind.LENGTH, SetupKind.SAME_NUMBER)
+UPPER: Final = "upper"
 
 
 class SetupStore(Protocol):
@@ -89,9 +93,12 @@ class SetupOrders:
         if order.spec.action == "check":
             return self._check(order)
         kind, told = SetupKind(order.spec.name), order.arguments
-        subject, values = self._subject_of(kind, order), tuple(told[name] for name in VALUES[kind])
-        number = self._book.next_number()
-        entry = ToldValue(number, kind, subject, values, told["sigma"], order.by, order.utc, told.get("used"))
+        subject, number = self._subject_of(kind, order), self._book.next_number()
+        if kind is SetupKind.SAME_NUMBER:
+            values, sigma = (float(str(told["which"]) == UPPER),), 1.0
+        else:
+            values, sigma = tuple(told[name] for name in VALUES[kind]), told["sigma"]
+        entry = ToldValue(number, kind, subject, values, sigma, order.by, order.utc, told.get("used"))
         before = self._book.standing(kind, subject)
         detail = self._enter(entry)
         if before is not None and (before.values, before.sigma) != (entry.values, entry.sigma):
@@ -113,7 +120,9 @@ class SetupOrders:
     def _subject_of(self, kind: SetupKind, order: SetupOrder) -> str:
         if kind is SetupKind.JOINT:
             return joint_subject(*self._checked_joint(order))
-        return str(order.tube) if kind is SetupKind.LENGTH else ""
+        if kind is SetupKind.SAME_NUMBER and order.tube not in self._book.doubled:
+            raise SelectorError(f"same_number: tube {order.tube}: expected a number that two tubes give themselves")
+        return str(order.tube) if kind in OF_TUBES else ""
 
     def _enter(self, entry: ToldValue) -> str:
         self._store.keep_told(entry)

@@ -18,7 +18,7 @@ DRIVE = 0  # stands for the drive head among the tubes of a pair
 
 
 class SetupKind(enum.StrEnum):
-    """What is known of a setup; the first five can be told."""
+    """What is known of a setup; the first five and the last can be told."""
 
     NORTH = "north"
     COLLAR = "collar"
@@ -33,6 +33,8 @@ class SetupKind(enum.StrEnum):
     PLAY = "play"
     PATH = "path"
     GRAVITY = "gravity"
+    DOUBLED = "doubled"  # found: a number of two tubes, with epoch, rig time (s) and both places
+    SAME_NUMBER = "same_number"  # told: 1 where the upper of both is the tube, 0 where the lower is
 
 
 class SetupSource(enum.StrEnum):
@@ -47,6 +49,8 @@ class SetupSource(enum.StrEnum):
 SUBJECTS: Final = {
     SetupKind.JOINT: re.compile(r"([0-9]{1,3}|drive)-[0-9]{1,3}"),
     SetupKind.LENGTH: re.compile(r"[0-9]{1,3}"),
+    SetupKind.DOUBLED: re.compile(r"[0-9]{1,3}"),
+    SetupKind.SAME_NUMBER: re.compile(r"[0-9]{1,3}"),
 }
 
 
@@ -104,6 +108,8 @@ def joint_subject(upper: int, lower: int) -> str:
 
 def shown_value(told: ToldValue) -> str:
     """A value with its standard deviation and unit, for people."""
+    if told.kind is SetupKind.SAME_NUMBER:
+        return "the upper of both" if told.values[0] else "the lower of both"
     is_length = told.kind in (SetupKind.LENGTH, SetupKind.STICK_UP)
     scale, unit = (1.0, "m") if is_length else (math.degrees(1.0), "deg")
     values = " to ".join(f"{scale * value:g}" for value in told.values)

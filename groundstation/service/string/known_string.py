@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from groundstation.config import GroundConfig
 from groundstation.service.string.depth import DepthLog
+from groundstation.service.string.doubled_numbers import OTHER, DoubledNumbers
 from groundstation.service.string.message_numbers import MessageNumbers
 from groundstation.service.string.node_states import NodeStates
 from groundstation.service.string.numbered_rows import NumberedRows
@@ -40,6 +41,7 @@ class KnownString:
     depths, stops : where the bit was, and where it stood to be surveyed
     numbers : which numbers of the tubes' messages have come
     joints : angles at which the tubes were made up
+    doubled : numbers that two tubes give themselves; the other of both is known by a number of its own
     events, static_records : the newest that came
     """
 
@@ -51,6 +53,7 @@ class KnownString:
         self.stops = Stops(self.tally, config.survey_after)
         self.numbers = MessageNumbers()
         self.joints = JointAngles()
+        self.doubled = DoubledNumbers()
         self.events: NumberedRows[Event] = NumberedRows(EVENTS_KEPT)
         self.static_records: NumberedRows[StaticRecord] = NumberedRows(STATIC_RECORDS_KEPT)
         self._stale_after = config.stale_after
@@ -109,8 +112,22 @@ class KnownString:
         if is_newest:
             if state.tube not in self.tally.tubes and now < self._tubes_known_at:
                 self._tubes_known_at = now + ALL_HEARD_WITHIN
-            self.tally.on_hops(state.tube, state.hops)
+            self._on_hops(state.tube, state.hops)
         return is_newest is not None
+
+    def _on_hops(self, tube: int, hops: int) -> None:
+        """Give a tube its place; the other of two with one number has none where it speaks in the place of a tube."""
+        others = (one for one in self.tally.tubes if one != tube and self.tally.place_of(one) == hops)
+        if tube < OTHER or not any(map(self.states.is_stale, others)):
+            self.tally.on_hops(tube, hops)
+
+    def on_doubled(self) -> None:
+        """Which of two tubes of one number is the tube was told, or taken back: they change names in the string."""
+        for tube in [one - OTHER for one in self.tally.tubes if one > OTHER]:
+            upper = self.doubled.upper_of(tube)
+            lower = 2 * tube + OTHER - upper
+            if tube in self.tally.tubes and self.tally.tubes.index(upper) > self.tally.tubes.index(lower):
+                self.tally.exchange(upper, lower)
 
     def on_rig_time(self, rig_now: float, epoch: int) -> None:
         """Follow rig time (s) of an epoch."""
@@ -151,7 +168,7 @@ class KnownString:
         """
         tube, tally = measurement.tube, self.tally
         if tube not in tally.tubes:
-            tally.on_hops(tube, measurement.hops)
+            self._on_hops(tube, measurement.hops)
         bit = self.depths.latest
         if bit is None or tally.misfit(bit, ()) or not self.knows_tubes:
             return None

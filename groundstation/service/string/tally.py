@@ -35,6 +35,16 @@ class Tally:
         if counts == list(range(1, len(counts) + 1)):
             self.tubes.sort(key=lambda known: self._hops[known])
 
+    def place_of(self, tube: int) -> int | None:
+        """Hop count that a tube has reported last; None of one that has reported none."""
+        return self._hops.get(tube)
+
+    def exchange(self, one: int, other: int) -> None:
+        """Have two tubes of the string change names."""
+        names = {one: other, other: one}
+        self.tubes = [names.get(tube, tube) for tube in self.tubes]
+        self._hops = {names.get(tube, tube): hops for tube, hops in self._hops.items()}
+
     def restore(self, tubes: list[int]) -> None:
         """Restore the order known before a restart, top first; it holds until reports complete another."""
         self.tubes = list(tubes)

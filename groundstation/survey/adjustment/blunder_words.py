@@ -79,8 +79,14 @@ def advise_crew(blunder: Blunder, tubes: Sequence[str]) -> str:
     if blunder.is_doubt:
         return AGAIN
     one = blunder.best.hypothesis
-    words = {"tube": tubes[one.subject[0]], "other": tubes[one.subject[-1]]} if one.subject else {}
-    return ADVICE[one.kind].format(**words)
+    return ADVICE[one.kind].format(**name_tubes(one, tubes))
+
+
+def name_tubes(one: Hypothesis, tubes: Sequence[str]) -> dict[str, str]:
+    """Names of the tubes that an explanation is about; none where it is about the hole, whose stations it counts."""
+    if not one.subject or one.kind is K.HOLE_MOVED:
+        return {}
+    return {"tube": tubes[one.subject[0]], "other": tubes[one.subject[-1]]}
 
 
 def say_blunder(blunder: Blunder, run: RunOfStops, tubes: Sequence[str]) -> str:
@@ -100,11 +106,9 @@ def say_blunder(blunder: Blunder, run: RunOfStops, tubes: Sequence[str]) -> str:
 def say_explanation(one: Explanation, run: RunOfStops, tubes: Sequence[str]) -> str:
     """One explanation as a sentence."""
     kind, subject = one.hypothesis.kind, one.hypothesis.subject
-    words = {"size": say_size(one), "depth": f"{run.md[one.hypothesis.stop]:.1f} m"}
+    words = {"size": say_size(one), "depth": f"{run.md[one.hypothesis.stop]:.1f} m"} | name_tubes(one.hypothesis, tubes)
     if kind is K.HOLE_MOVED:
         words |= {"first": f"{run.station_md[subject[0]]:.1f} m", "last": f"{run.station_md[subject[1]]:.1f} m"}
-    elif subject:
-        words |= {"tube": tubes[subject[0]], "other": tubes[subject[-1]]}
     return SENTENCES[kind].format(**words)
 
 

@@ -5,6 +5,7 @@ Source: Association of Geotechnical and Geoenvironmental Specialists, AGS 4.1.1.
 
 from __future__ import annotations
 
+from groundstation.entry.quoted_cells import quoted_cell
 from groundstation.survey.exports.export_hole import ExportHole, ExportSite
 
 Rows = list[tuple[str, ...]]
@@ -72,4 +73,5 @@ def _group(name: str, heading: tuple[str, ...], units: tuple[str, ...], types: t
 
 
 def _text(text: str) -> str:
-    return text.replace('"', '""').replace("\n", " ")
+    """What a user wrote, in one line; a spreadsheet, which opens such a file as a table, computes none of it."""
+    return str(quoted_cell(text)).replace('"', '""').replace("\n", " ")

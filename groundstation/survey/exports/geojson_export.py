@@ -27,8 +27,8 @@ def geojson_bytes(site: ExportSite) -> bytes:
 
     try:
         to_degrees = Transformer.from_crs(site.crs, "EPSG:4326", always_xy=True)
-    except CRSError as error:
-        raise SurveyError(f"--grid-crs: expected a grid such as EPSG:25833, got {site.crs!r}: {error!s:.60}") from None
+    except CRSError:
+        raise SurveyError(f"--grid-crs: expected a grid such as EPSG:25833, got {site.crs!r:.60}") from None
     features = [_feature(hole, to_degrees) for hole in site.holes]
     collection = {"type": "FeatureCollection", "features": features}
     return (json.dumps(collection, allow_nan=False) + "\n").encode()

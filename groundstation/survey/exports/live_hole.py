@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import datetime
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
 from groundstation.survey.exports.export_hole import ExportHole, ExportSite
 from groundstation.survey.exports.export_request import ENU
@@ -34,8 +34,8 @@ class LivePlace:
         """
         if self.origin is None and self.grid_crs:
             raise SurveyError("--grid-crs: expected --origin NORTHING EASTING HEIGHT of the collar beside it")
-        if self.origin is not None and not all(map(math.isfinite, self.origin)):
-            raise SurveyError(f"--origin: expected three numbers, got {self.origin}")
+        for value in self.origin or ():
+            RANGES["coordinate"].check("--origin", value)
 
     def axis_of(self, local: Any) -> Any:
         """Easting, northing and height (n, 3) of positions (n, 3) north, east, down of the collar."""

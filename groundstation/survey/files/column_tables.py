@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.entry.null_values import is_null
+from groundstation.entry.null_values import ANGLES_NEVER, BEYOND, NEVER, is_null
 from groundstation.errors import SurveyError
 from groundstation.survey.files.cell_numbers import cell_numbers, decimal_sign, plain_cell
 from groundstation.survey.files.field_table import FieldTable
@@ -65,10 +65,13 @@ def read_table_columns(
             if name in names:
                 raise
             continue
-        for line, value in zip(table.lines, values, strict=True) if name in OWN.values() else ():
-            if value is not None and not math.isfinite(value):
-                raise SurveyError(f"{path}: line {line}: expected a finite {name}, got {value}")
-        found[name] = scale * np.array([_value(name, value) for value in values])
+        numbers = np.array(values, float)  # None becomes nan
+        if not _are_plain(numbers):
+            for line, value in zip(table.lines, values, strict=True) if name in OWN.values() else ():
+                if value is not None and not math.isfinite(value):
+                    raise SurveyError(f"{path}: line {line}: expected a finite {name}, got {value}")
+            numbers = np.array([_value(name, value) for value in values])
+        found[name] = scale * numbers
     return found, table.lines
 
 
@@ -102,7 +105,7 @@ def _renamed(path: Path, table: FieldTable, names: set[str]) -> list[tuple[str, 
 
 def _decimal(path: Path, table: FieldTable, header: list[str], texts: tuple[str, ...]) -> str:
     """Decimal sign of all columns of numbers."""
-    if not table.numbers_as_text:
+    if not table.numbers_as_text or not any("," in "".join(row) for row in table.rows):
         return "."
     places = [k for k, name in enumerate(header) if name not in texts and name]
     cells = [row[k] for row in table.rows for k in places if row[k] and row[k].lstrip("+-")[:1].isdigit()]
@@ -115,6 +118,11 @@ def _is_number(cell: str, decimal: str) -> bool:
     except ValueError:
         return False
     return decimal != "."
+
+
+def _are_plain(numbers: Array) -> bool:
+    """Whether none of them is missing, without end or stands for none: each need not be looked at by itself."""
+    return bool(np.all(np.abs(numbers) <= BEYOND)) and not np.any(np.isin(numbers, [*NEVER, *ANGLES_NEVER]))
 
 
 def _value(name: str, value: float | None) -> float:

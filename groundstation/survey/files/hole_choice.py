@@ -11,6 +11,7 @@ from pathlib import Path
 from groundstation.entry.entry_warning import EntryWarning
 from groundstation.errors import SurveyError
 from groundstation.survey.files.field_table import FieldTable, TableWish
+from groundstation.survey.well.analysis import RECORD_COLUMNS
 
 REMARKS = (
     "comment", "comments", "remark", "remarks", "note", "notes", "bemerkung", "description", "date", "time", "datetime",
@@ -68,7 +69,9 @@ def _chosen(
 
 
 def _names(table: FieldTable, place: int) -> list[str]:
-    """Different words of a column; none where it holds numbers or remarks."""
+    """Different words of a column; none where it holds numbers or remarks, or what an instrument asks for."""
+    if table.header[place] in RECORD_COLUMNS:
+        return []
     title = " ".join(table.header[place].lower().replace("_", " ").split())
     if title in REMARKS:
         return []

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.entry.null_values import is_null
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.well.analysis import Stretch
@@ -103,4 +104,6 @@ def _toml(path: Path, what: str) -> dict[str, Any]:
 def _number(where: str, key: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise SurveyError(f"{where}: {key}: expected a number, got {value!r:.60}")
+    if is_null(float(value), angle=key.endswith("_deg")):
+        raise SurveyError(f"{where}: {key}: expected a number, got {value:g}, which stands for no value")
     return float(value)

@@ -18,6 +18,7 @@ from groundstation.errors import SurveyError
 from groundstation.survey.files.cell_numbers import cell_numbers, decimal_sign
 from groundstation.survey.files.field_table import FieldTable, TableWish
 from groundstation.survey.files.hole_choice import choose_hole
+from groundstation.survey.files.instrument_columns import instrument_column
 from groundstation.survey.files.survey_columns import (
     ALLOWED,
     TO_SI,
@@ -26,6 +27,7 @@ from groundstation.survey.files.survey_columns import (
     named_columns,
 )
 from groundstation.survey.files.survey_records import STATIONS, stations_of
+from groundstation.survey.well.analysis import RECORD_COLUMNS
 from groundstation.survey.well.well_record import SurveyRecord
 
 Array = npt.NDArray[np.float64]
@@ -68,7 +70,7 @@ def understand_table(path: Path, table: FieldTable, wish: TableWish) -> Understo
     }
     if columns[1].quantity == "dip":
         numbers[STATIONS[1]] = _of_dip(path, table.header[columns[1].place], numbers[STATIONS[1]])
-    numbers |= _other_columns(table, columns, kept, decimal)
+    numbers |= _other_columns(path, table, columns, kept, decimal)
     record = replace(stations_of(path, numbers, lines, wish.fewest), warnings=(*warnings, *missing))
     north = columns[2].north or table.said.get("north", "")
     return Understood(record, _line(table, columns, decimal, record), north, table.said.get("depth_reference", ""))
@@ -208,12 +210,20 @@ def _of_dip(path: Path, name: str, dip_deg: Array) -> Array:
     return np.asarray(90.0 - np.abs(dip_deg))
 
 
-def _other_columns(table: FieldTable, columns: list[NamedColumn], kept: list[int], decimal: str) -> dict[str, Array]:
-    """Further columns of numbers, by their names."""
-    taken, found = {column.place for column in columns}, {}
+def _other_columns(
+    path: Path, table: FieldTable, columns: list[NamedColumn], kept: list[int], decimal: str
+) -> dict[str, Array]:
+    """Further columns of numbers, by their names; those that an instrument may ask for hold good numbers or none."""
+    taken = {column.place for column in columns}
+    found: dict[str, Array] = {}
     for place, name in enumerate(table.header):
         cells = [table.rows[k][place] for k in kept]
-        if place in taken or not name or name in STATIONS or not all(cells):
+        if place in taken or not name or name in STATIONS:
+            continue
+        if name in RECORD_COLUMNS:
+            found |= instrument_column(path, name, cells, [table.lines[k] for k in kept], decimal)
+            continue
+        if not all(cells):
             continue
         try:
             numbers = cell_numbers(Path(), [0] * len(cells), name, cells, decimal)

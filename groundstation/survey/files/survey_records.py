@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.null_values import is_null
 from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
 from groundstation.survey.bearings import wrap_azimuth
@@ -49,18 +50,6 @@ def read_record(path: Path, rule: DisplacementRule = DisplacementRule.EXACT) -> 
         f"{path}: expected the columns {', '.join(DISPLACEMENTS)} or {', '.join(STATIONS)}, got {', '.join(header)}"
         + _unit_hint(header)
     )
-
-
-def read_displacements(path: Path, rule: DisplacementRule = DisplacementRule.EXACT) -> SurveyRecord:
-    """Record of displacements; errors as ``read_record``."""
-    table, lines = read_columns(path, DISPLACEMENTS)
-    return _from_displacements(path, table, lines, rule)
-
-
-def read_stations(path: Path) -> SurveyRecord:
-    """Record of stations; errors as ``read_record``."""
-    table, lines = read_columns(path, STATIONS)
-    return stations_of(path, table, lines)
 
 
 def with_collar(record: SurveyRecord) -> SurveyRecord:
@@ -197,6 +186,12 @@ def stations_of(path: Path, table: dict[str, Array], lines: list[int], fewest: i
 def _from_displacements(path: Path, table: dict[str, Array], lines: list[int], rule: DisplacementRule) -> SurveyRecord:
     for name in DISPLACEMENTS:
         _finite(path, name, table[name], lines)
+        none = [k for k, value in enumerate(table[name].tolist()) if is_null(value, angle=name != "md_m")]
+        if none:
+            raise SurveyError(
+                f"{path}: line {lines[none[0]]}: {name} = {table[name][none[0]]:g} stands for no value; "
+                "without a displacement nothing is known of the stations below it"
+            )
     md, a, b = table["md_m"], table["a_cm"] / 100.0, table["b_cm"] / 100.0
     _check(path, md, lines)
     if a[0] != 0.0 or b[0] != 0.0:

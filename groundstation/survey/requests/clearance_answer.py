@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.entry.entry_warning import EntryWarning, warning_rows
+from groundstation.entry.quantity_ranges import RANGES
 from groundstation.entry.station_plausibility import radius_warnings, station_warnings
 from groundstation.errors import SurveyError
 from groundstation.survey.files.field_files import read_any
@@ -57,6 +58,8 @@ def answer_clearance(request: ClearanceRequest) -> dict[str, Any]:
         When a record or an instrument cannot be used.
     """
     check_figures(request)
+    for value in request.offset_head:
+        RANGES["distance"].check("--offset-head", value)
     serial = "one" if request.same_instrument else ""
     mine = _Described(
         str(request.reference), _record(request.reference, request.hole), request.instrument, np.zeros(3),

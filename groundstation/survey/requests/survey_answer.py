@@ -161,6 +161,8 @@ def site_grid(asked: FrameRequest, answer: str, norths: Norths) -> SiteGrid | No
         if asked.grid_scale_factor != 1.0:
             raise SurveyError("--grid-scale-factor: expected --origin beside it")
         return None
+    for value in asked.origin:
+        RANGES["coordinate"].check("--origin", value)
     north = north_of_coordinates(answer)
     if north == "grid" and asked.north != "grid" and asked.convergence_deg is None:
         raise SurveyError("--origin: its coordinates count from grid north; expected --convergence-deg beside it")

@@ -24,13 +24,13 @@ def source_table_text(found: Analysis) -> str:
     parts, named = found.uncertainty.by_source(), frame_words(found.frame)
     for k, md in enumerate(found.md.tolist()):
         for name, cov in parts.items():
-            writer.writerow([md, name, *(float(cov[(k, *place)]) for place in places), *named])
+            writer.writerow([md, quoted_cell(name), *(float(cov[(k, *place)]) for place in places), *named])
     return text.getvalue()
 
 
 def frame_words(frame: ReferenceFrame) -> list[str]:
-    """North, depth reference and height datum, as every row of a table names them."""
-    return [frame.answer, frame.depths.answer, frame.height_datum]
+    """North, depth reference and height datum, as every row of a table names them; no spreadsheet computes them."""
+    return [str(quoted_cell(word)) for word in (frame.answer, frame.depths.answer, frame.height_datum)]
 
 
 def station_table_text(rows: list[dict[str, Any]], frame: ReferenceFrame, site: dict[str, Any] | None = None) -> str:
@@ -43,7 +43,6 @@ def station_table_text(rows: list[dict[str, Any]], frame: ReferenceFrame, site: 
     of_site = [] if site is None else ["site"]
     writer.writerow([*plain, *(f"uncertainty_{key}" for key in half), *FRAME, *of_grid, *of_site])
     named = frame_words(frame) + ([] if frame.grid is None else [frame.grid.north])
-    named = [str(quoted_cell(word)) for word in named]
     named += [] if site is None else [site_words(site).removeprefix("site: ")]
     writer.writerows(
         [[*(row[key] for key in plain), *(row["uncertainty"][key] for key in half), *named] for row in rows]

@@ -19,6 +19,7 @@ from groundstation.errors import SurveyError
 Array = npt.NDArray[np.float64]
 NODES = 64  # of the quadrature
 REACH = 9.0  # standard deviations that the quadrature covers
+NO_TAIL = 39.0  # standard deviations, beyond which a tail is below the least number
 SMALLEST_STD = 1e-9  # m, stands for none in the quadrature
 RADIUS_REACH = 8.0  # standard deviations of the radii that are integrated over
 RADIUS_NODES = 16  # of each of three panels
@@ -92,9 +93,13 @@ def probability_beyond(mean: Array, cov: Array, limit: Array | float) -> Array:
     # x = limit sin(a) takes away the root at the ends of the circle
     a1, a2 = (np.arcsin(np.clip(x / limit, -1.0, 1.0)) for x in (low, np.maximum(low, high)))
     angle = 0.5 * (a2 - a1)[..., None] * nodes + 0.5 * (a2 + a1)[..., None]
-    x, chord = limit[..., None] * np.sin(angle), limit[..., None] * np.cos(angle)
+    sine = np.sin(angle)
+    x, chord = limit[..., None] * sine, limit[..., None] * np.sqrt((1.0 - sine) * (1.0 + sine))
     density = np.exp(-0.5 * ((x - u[..., None]) / su[..., None]) ** 2) / (su[..., None] * math.sqrt(math.tau))
-    tails = ndtr((-chord - v[..., None]) / sv[..., None]) + ndtr((v[..., None] - chord) / sv[..., None])
+    size, far = np.abs(v), chord.min(axis=-1, initial=np.inf)
+    tails = ndtr((size[..., None] - chord) / sv[..., None])
+    both = (size + far) / sv < NO_TAIL  # beyond that the tail of the other side is 0
+    tails[both] += ndtr((-chord[both] - size[both, None]) / sv[both, None])
     inside = np.sum(weights * density * tails * chord, axis=-1) * 0.5 * (a2 - a1)
     return np.asarray(np.clip(outside + inside, 0.0, 1.0))
 

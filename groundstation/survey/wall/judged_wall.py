@@ -57,16 +57,11 @@ def part_around(wall: Wall, own: int) -> tuple[Wall, int]:
         plans=[wall.plans[k] for k in kept],
         holes=[wall.holes[k] for k in kept],
         drilled_on=[wall.drilled_on[k] for k in kept],
-        warnings=tuple(w for w in wall.warnings if _is_of(w.what, [wall.plans[k].design.name for k in kept])),
+        warnings=(),  # those of the part are found where it is judged
         pairs=_renumbered(wall.pairs[joints], new),
         detours=[Detour(joints.index(detour.joint), _renumbered(detour.pairs, new)) for detour in detours],
     )
     return part, new[own]
-
-
-def _is_of(what: str, names: list[str]) -> bool:
-    """Whether a warning is of one of some columns, or of a joint of two of them."""
-    return what in names or any(what == f"{a}-{b}" for a in names for b in names)
 
 
 def _renumbered(pairs: npt.NDArray[np.intp], new: dict[int, int]) -> npt.NDArray[np.intp]:

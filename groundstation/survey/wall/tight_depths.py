@@ -3,7 +3,9 @@
 A joint is asked for from the upper of its two heads to the lower of its two toes, unless the wall states from where to
 where it is to be tight: a wall does not become tight by a column that was designed too short. Heads that lie level, of
 columns that are raked along the wall, begin at different planes without any of them being missing; there it is asked
-for where both are. Depths lie along the normal of the planes: true vertical where the columns are. m.
+for where both are. Of columns that lie flatter than 60 deg from the vertical a level ground says nothing of where they
+begin or end: those of a horizontal wall are level however short one of them is. Depths lie along the normal of the
+planes: true vertical where the columns are. m.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from groundstation.survey.wall.column_deviation import ColumnDesign
 Array = npt.NDArray[np.float64]
 Pairs = npt.NDArray[np.intp]
 SAME_PLANE = 1e-6  # m
+STEEP = 0.5  # cosine of 60 deg from the vertical, up to which a level ground cuts columns off
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +49,8 @@ def tight_depths(designs: Sequence[ColumnDesign], frame: Array, pairs: Pairs, st
     """First and last depth (joints, 2) at which each joint is to be tight; ``frame`` (3, 3) is that of the planes."""
     ends = _ends(designs, frame)
     tops, bottoms = ends[pairs, 0, 1], ends[pairs, 1, 1]  # (joints, both columns)
-    level = np.ptp(ends[pairs, :, 0], axis=1) <= TOE  # (joints, head and toe): as deep as each other below the site
+    steep = abs(float(frame[2, 2])) >= STEEP
+    level = (np.ptp(ends[pairs, :, 0], axis=1) <= TOE) & steep  # (joints, head and toe): as deep below the site
     top = np.where(level[:, 0], tops.max(axis=1), tops.min(axis=1))
     bottom = np.where(level[:, 1], bottoms.min(axis=1), bottoms.max(axis=1))
     top = top if stated.top is None else np.full(len(pairs), stated.top)

@@ -37,6 +37,7 @@ from groundstation.survey.well.methods import station_positions, station_tangent
 Array = npt.NDArray[np.float64]
 FLATTEST = 0.17  # cosine (80 deg) between a hole and the planes' normal, below which it is not cut by them
 SAME_END = 1e-6  # m
+MOST_PLANES = 100_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,13 +180,24 @@ def _last_survey(way: Way) -> int:
 
 
 def _depths(plans: Sequence[ColumnPlan], frame: Array, assumed: Assumptions) -> Array:
-    """Planes at most a step apart, from the first head to the last toe or over what is stated to be tight."""
+    """Planes from the first head to the last toe or over what is stated to be tight.
+
+    They lie a step apart at the most, and where a layer begins: one that is thinner than a step has a plane too.
+    """
     heads = np.array([plan.design.head for plan in plans])
     toes = np.array([plan.design.end.point for plan in plans])
     top, bottom = float(np.min(heads @ frame[2])), float(np.max(toes @ frame[2]))
     stated = assumed.tight
     top, bottom = top if stated.top is None else stated.top, bottom if stated.bottom is None else stated.bottom
-    return np.append(np.arange(top, bottom - 1e-3, assumed.step), bottom)
+    if bottom - top > MOST_PLANES * assumed.step:
+        raise SurveyError(
+            f"depth_step_m: expected at most {MOST_PLANES} planes across the columns, got them {assumed.step:g} m "
+            f"apart from {top:g} to {bottom:g} m"
+        )
+    planes = np.append(np.arange(top, bottom - 1e-3, assumed.step), bottom)
+    layers = np.array([layer.top for layer in assumed.layers if top < layer.top < bottom])
+    beside = np.abs(planes[:, None] - layers).min(axis=1, initial=np.inf) < SAME_END
+    return np.sort(np.concatenate([planes[~beside], layers]))
 
 
 def _alike(plans: Sequence[ColumnPlan], ways: Sequence[Way | None]) -> list[list[int]]:
@@ -248,12 +260,13 @@ def _design_centres(design: ColumnDesign, frame: Array, depths: Array) -> Array:
 def _radii(
     plans: Sequence[ColumnPlan], depths: Array, layers: tuple[Layer, ...]
 ) -> tuple[Array, Array, npt.NDArray[np.intp]]:
-    """Radii and their standard deviations (columns, depths), and the layer of every depth."""
+    """Radii and their standard deviations (columns, depths), and the layer of every depth; each layer has depths."""
     tops = np.array([layer.top for layer in layers])
     index = np.maximum(np.searchsorted(tops, depths, side="right") - 1, 0)
     designed = np.array([plan.design.radius for plan in plans])
     radii = np.stack([[layers[i].radius or r for i in index] for r in designed])
-    return radii, radii * np.array([layers[i].radius_cv for i in index]), np.asarray(index, np.intp)
+    _, layer = np.unique(index, return_inverse=True)  # one above the first plane is none
+    return radii, radii * np.array([layers[i].radius_cv for i in index]), np.asarray(layer, np.intp)
 
 
 def _check_covariances(some: list[tuple[ColumnPlan, Way]], errors: list[ErrorColumns]) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.entry.entry_warning import EntryWarning
+from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
 from groundstation.survey.wall.as_built import Columns
@@ -24,8 +25,9 @@ from groundstation.survey.wall.closing import ClosingDay, closing_by_day
 from groundstation.survey.wall.column_deviation import Tolerance, parse_tolerance
 from groundstation.survey.wall.column_joint import largest_distance
 from groundstation.survey.wall.column_plans import Assumptions, ColumnPlan, ColumnSurvey
-from groundstation.survey.wall.tight_depths import TightRange, asked_depths, check_reach, tight_depths
+from groundstation.survey.wall.tight_depths import TightRange, asked_depths, tight_depths
 from groundstation.survey.wall.wall_columns import BuiltWall, build_wall
+from groundstation.survey.wall.wall_design import check_design, find_detours, find_pairs
 from groundstation.survey.wall.wall_frames import (
     FRAMES,
     NORTH_ANGLES,
@@ -36,11 +38,11 @@ from groundstation.survey.wall.wall_frames import (
     norths_of,
     place_of,
 )
-from groundstation.survey.wall.wall_joints import Detour, neighbours_in_grid, neighbours_in_line
+from groundstation.survey.wall.wall_joints import Detour
 from groundstation.survey.wall.wall_layers import MOST_RADIUS_CV, layers_of
 from groundstation.survey.wall.wall_plausibility import wall_warnings
 from groundstation.survey.wall.wall_stations import read_holes
-from groundstation.survey.wall.wall_tables import STRAIGHT, Defaults, Remedy, read_course, read_heads
+from groundstation.survey.wall.wall_tables import STRAIGHT, Defaults, read_course, read_heads
 from groundstation.survey.well.depth_reference import DEPTHS_FROM
 from groundstation.survey.well.methods import Method
 from groundstation.survey.well.reference_frames import SiteGrid
@@ -50,7 +52,6 @@ if TYPE_CHECKING:
     from groundstation.plan_settings import PlanSettings
 
 Array = npt.NDArray[np.float64]
-SAME_PLACE = 1e-3  # m, within which two designs are one
 LAYOUTS = ("line", "shaft", "grid")
 NEEDED = ("radius_m", "thickness_m", "heads", "stations")
 NAMED = ("project", "client", "calibration", "height_datum")  # of the report alone
@@ -74,10 +75,13 @@ POSITIVE = (
 NOT_NEGATIVE = (
     "radius_cv", "radius_correlation", "head_sigma_m", "unsurveyed_percent", "inclination_deg", "azimuth_deg",
 )  # fmt: skip
+MOST_DEPTH = RANGES["depth"].high
 MOST = {
     "allowed_probability": 0.5, "radius_cv": MOST_RADIUS_CV, "radius_correlation": 1.0, "unsurveyed_percent": 100.0,
     "inclination_deg": 180.0, "azimuth_deg": 360.0, "dip_deg": 90.0, "latitude_deg": 90.0, "declination_deg": 180.0,
-    "convergence_deg": 180.0, "north_of_site_deg": 360.0,
+    "convergence_deg": 180.0, "north_of_site_deg": 360.0, "depth_step_m": 2.0, "spacing_m": MOST_DEPTH,
+    "length_m": MOST_DEPTH, "tight_from_m": MOST_DEPTH, "tight_to_m": MOST_DEPTH, "head_sigma_m": MOST_DEPTH,
+    REFERENCE_HEIGHT: MOST_DEPTH, **dict.fromkeys(ORIGIN, RANGES["coordinate"].high),
 }  # fmt: skip
 
 
@@ -313,79 +317,13 @@ def read_wall(path: Path) -> Wall:
         built = build_wall(plans, holes, file.assumed)
     except SurveyError as error:
         raise SurveyError(f"{path}: {error}") from None
-    pairs = _pairs(file, [row.remedy for row in rows], built)
-    detours = _detours(file.heads, names, [row.remedy for row in rows], pairs)
-    _check_design(file, plans, built, pairs, {detour.joint for detour in detours})
-    days = [row.drilled_on for row in rows]
-    return Wall(file, plans, built, pairs, detours, holes, days, wall_warnings(plans, holes, pairs))
-
-
-def _pairs(file: WallFile, remedies: list[Remedy], built: BuiltWall) -> npt.NDArray[np.intp]:
-    """Neighbours among the columns of the design; remedial ones stand beside them."""
-    designed = np.array([k for k, remedy in enumerate(remedies) if not remedy.asked], np.intp)
-    heads = built.columns.designs[designed]
-    if file.layout == "grid":
-        found = neighbours_in_grid(heads, file.spacing or 0.0)
-    else:
-        found = neighbours_in_line(len(designed), closed=file.layout == "shaft")
-    if not len(found):
-        raise SurveyError(f"{file.heads}: expected at least two columns next to each other, got {len(designed)}")
-    return designed[found]
-
-
-def _detours(path: Path, names: list[str], remedies: list[Remedy], pairs: npt.NDArray[np.intp]) -> list[Detour]:
-    """Joints that a remedial column stands in for."""
-    found = []
-    index = {name: k for k, name in enumerate(names)}
-    for extra, remedy in enumerate(remedies):
-        for name in remedy.named:
-            if name not in index:
-                raise SurveyError(f"{path}: column {names[extra]}: column {name} is not among the heads")
-        if remedy.between:
-            a, b = (index[name] for name in remedy.between)
-            joints = [j for j, pair in enumerate(pairs.tolist()) if set(pair) == {a, b}]
-            if not joints:
-                raise SurveyError(f"{path}: column {names[extra]}: {'/'.join(remedy.between)} is no joint of this wall")
-            found.append(Detour(joints[0], np.array([[a, extra], [extra, b]], np.intp)))
-        if remedy.replaces:
-            gone = index[remedy.replaces]
-            for j, (a, b) in enumerate(pairs.tolist()):
-                if gone in (a, b):
-                    pair = [extra, b] if a == gone else [a, extra]
-                    found.append(Detour(j, np.array([pair], np.intp)))
-    return found
-
-
-def _check_apart(path: Path, columns: Columns) -> None:
-    """Refuse two columns of the design that are one: the second closes nothing. A remedial one may stand in for it."""
-    shown: dict[bytes, str] = {}
-    for name, planned in zip(columns.names, columns.planned, strict=True):
-        other = shown.setdefault(np.round(planned / SAME_PLACE).tobytes(), name)
-        if other != name:
-            raise SurveyError(f"{path}: columns {other} and {name} are one by their design; expected them apart")
-
-
-def _check_design(
-    file: WallFile, plans: list[ColumnPlan], built: BuiltWall, pairs: npt.NDArray[np.intp], helped: set[int]
-) -> None:
-    """Refuse a wall none of whose joints could be thick enough, built as designed, or whose columns do not reach.
-
-    ``helped`` : joints that have a way by remedial columns, whose own designs need not reach
-    """
-    columns = built.columns
-    _check_apart(file.path, columns.subset(np.unique(pairs)))
-    alone = pairs[[j for j in range(len(pairs)) if j not in helped]]
+    remedies = [row.remedy for row in rows]
+    pairs = find_pairs(file.heads, file.layout, file.spacing, built.columns, remedies)
+    detours = find_detours(file.heads, names, remedies, pairs)
     designs = [plan.design for plan in plans]
     try:
-        check_reach(designs, built.frame, alone, tight_depths(designs, built.frame, alone, file.assumed.tight))
+        check_design(designs, built, pairs, {detour.joint for detour in detours}, file.thickness, file.assumed.tight)
     except SurveyError as error:
-        raise SurveyError(f"{file.path}: {error}") from None
-    a, b = pairs[:, 0], pairs[:, 1]
-    apart = columns.planned[b] - columns.planned[a]
-    distance = np.hypot(apart[..., 0], apart[..., 1])
-    limit = largest_distance(float(np.max(columns.radii)), file.thickness)
-    if float(np.min(distance)) > limit:
-        raise SurveyError(
-            f"{file.path}: the design cannot be met anywhere: its nearest columns are {np.min(distance):.3f} m apart, "
-            f"a joint of {file.thickness:g} m needs {limit:.3f} m or less"
-        )
+        raise SurveyError(f"{path}: {error}") from None
+    days = [row.drilled_on for row in rows]
+    return Wall(file, plans, built, pairs, detours, holes, days, wall_warnings(plans, holes, pairs))

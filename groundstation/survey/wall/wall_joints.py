@@ -14,11 +14,12 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.wall.as_built import Columns
-from groundstation.survey.wall.column_joint import joint_thickness, largest_distance, probability_thin
+from groundstation.survey.wall.column_joint import joint_thickness, limit_distances, probability_thin
 from groundstation.survey.wall.column_state import ColumnState
 
 Array = npt.NDArray[np.float64]
 AT_ONCE = 64  # joints that are judged together
+NEIGHBOURS = 1.2  # spacings of a grid within which two columns are neighbours
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,10 +177,11 @@ def extra_column(columns: Columns, found: Joints, joint: int, required: float) -
         kept = [columns.centres[a, thin], columns.centres[b, thin]]
         middle = 0.5 * (kept[0] + kept[1])
         north, east = 0.5 * (middle.min(axis=0) + middle.max(axis=0))
-    limit = largest_distance(float(np.min(columns.radii[[a, b]][:, thin])), required)
+    thinnest = np.asarray(np.min(columns.radii[[a, b]][:, thin]))
+    limit = float(limit_distances(thinnest, thinnest, required))
     reach = max((float(np.max(np.hypot(way[:, 0] - north, way[:, 1] - east))) for way in kept), default=np.inf)
     depths = columns.depths[thin]
-    return ExtraColumn(float(north), float(east), float(depths[0]), float(depths[-1]), reach <= limit)
+    return ExtraColumn(float(north), float(east), float(depths[0]), float(depths[-1]), limit > 0.0 and reach <= limit)
 
 
 def neighbours_in_line(count: int, *, closed: bool) -> npt.NDArray[np.intp]:
@@ -189,10 +191,10 @@ def neighbours_in_line(count: int, *, closed: bool) -> npt.NDArray[np.intp]:
 
 
 def neighbours_in_grid(heads: Array, spacing: float) -> npt.NDArray[np.intp]:
-    """Pairs of columns whose heads are within 1.2 spacings of each other."""
+    """Pairs of columns whose heads are within ``NEIGHBOURS`` spacings of each other."""
     from scipy.spatial import cKDTree
 
-    pairs = cKDTree(heads).query_pairs(1.2 * spacing, output_type="ndarray")
+    pairs = cKDTree(heads).query_pairs(NEIGHBOURS * spacing, output_type="ndarray")
     return np.asarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], np.intp)
 
 

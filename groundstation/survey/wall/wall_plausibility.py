@@ -14,7 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.entry.entry_warning import EntryWarning
-from groundstation.entry.station_plausibility import radius_warnings, station_warnings
+from groundstation.entry.station_plausibility import (
+    departing_holes,
+    design_warnings,
+    radius_warnings,
+    station_warnings,
+)
 from groundstation.survey.wall.column_plans import ColumnPlan, ColumnSurvey
 from groundstation.survey.wall.wall_verdict import Finding, FindingKind
 from groundstation.survey.well.methods import station_tangents
@@ -23,6 +28,7 @@ if TYPE_CHECKING:
     from groundstation.survey.wall.wall_file import Wall
 
 MOST_LEAN = math.radians(10.0)  # of a hole from its design; a column is out of any tolerance at a fifth of it
+ROUNDED = 1e-9  # of its cosine
 MOST_DEPTH = 1.5  # times the design length ...
 MORE_DEPTH = 5.0  # ... and m, that a hole may be surveyed or drilled to
 MOST_OVERLAP = 2.0  # radius over the spacing of neighbours
@@ -33,14 +39,31 @@ def wall_warnings(
 ) -> tuple[EntryWarning, ...]:
     """Warnings of all columns; pairs (joints, 2) of neighbours."""
     found: list[EntryWarning] = []
-    for plan, hole in zip(plans, holes, strict=True):
+    odd = _odd_holes(plans, holes)
+    for k, (plan, hole) in enumerate(zip(plans, holes, strict=True)):
         found += hole.warnings
         found += radius_warnings(plan.design.radius, plan.design.name)
         found += _depths(plan, hole)
-        if len(hole.md):
+        if (course := plan.design.plan) is not None:
+            found += design_warnings(course.md, course.tangents, plan.design.name)
+        if k in odd:
             found += station_warnings(hole.md, hole.inclination, hole.azimuth, plan.design.name)
             found += _leans(plan, hole)
     return (*found, *_overlaps(plans, pairs))
+
+
+def _odd_holes(plans: Sequence[ColumnPlan], holes: Sequence[ColumnSurvey]) -> set[int]:
+    """Holes of whose stations there may be a warning; all are looked at together, for there may be thousands."""
+    hole = np.repeat(np.arange(len(holes)), [len(one.md) for one in holes])
+    if not len(hole):
+        return set()
+    md, inclination, azimuth = (
+        np.concatenate([getattr(one, name) for one in holes]) for name in ("md", "inclination", "azimuth")
+    )
+    axes = np.array([plan.design.axis for plan in plans])[hole]
+    leaning = np.sum(station_tangents(inclination, azimuth) * axes, axis=1) < math.cos(MOST_LEAN) + ROUNDED
+    planned = {k for k, plan in enumerate(plans) if plan.design.plan is not None and len(holes[k].md)}
+    return {*hole[leaning].tolist(), *departing_holes(md, inclination, azimuth, hole), *planned}
 
 
 def _depths(plan: ColumnPlan, hole: ColumnSurvey) -> list[EntryWarning]:

@@ -45,7 +45,7 @@ def read_holes(path: Path, plans: Sequence[ColumnPlan], heights: list[float]) ->
     table, lines, missing = _without_missing(table, lines, needed[1:])
     names = [plan.design.name for plan in plans]
     index = {name: k for k, name in enumerate(names)}
-    owner = np.array([index.get(str(name), -1) for name in table["column"]], np.intp)
+    owner = np.array([index.get(name, -1) for name in table["column"].tolist()], np.intp)
     unknown = np.flatnonzero(owner < 0)
     if len(unknown):
         k = int(unknown[0])

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.entry.null_values import is_null
+from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
 from groundstation.survey.files.column_tables import read_table_columns
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
@@ -182,7 +184,9 @@ def _number(where: str, key: str, text: str) -> float:
         raise SurveyError(
             f"{where}: {key}: expected a number{'' if low < 0.0 else ' that is not negative'}, got {text!r}"
         )
-    return value
+    if is_null(value, angle=key.endswith("_deg")):
+        raise SurveyError(f"{where}: {key}: expected a number, or nothing, got {text!r}, which stands for no value")
+    return RANGES[key if key.endswith("_deg") else "depth"].check(f"{where}: {key}", value)
 
 
 def _status(where: str, text: str) -> ColumnStatus:

@@ -185,9 +185,10 @@ def _column_findings(columns: Columns, among: set[int] | None) -> list[Finding]:
         ColumnState.MISSING: (FindingKind.MISSING, "is missing"),
         ColumnState.UNSURVEYED: (FindingKind.UNSURVEYED, "is not surveyed"),
     }
-    for k, (name, states) in enumerate(zip(columns.names, columns.states, strict=True)):
+    for k in np.flatnonzero(np.isin(columns.states, [*words]).any(axis=1)).tolist():
+        name = columns.names[k]
         for state, (kind, word) in words.items() if among is None or k in among else ():
-            for first, last in true_runs(states == state):
+            for first, last in true_runs(columns.states[k] == state):
                 top, bottom = float(columns.depths[first]), float(columns.depths[last])
                 found.append(Finding(kind, name, top, bottom, f"column {name} {word} from {top:g} to {bottom:g} m"))
     return found
@@ -200,9 +201,11 @@ def joint_name(columns: Columns, pair: npt.NDArray[np.intp]) -> str:
 
 def _joint_findings(columns: Columns, found: Joints, required: float, allowed: float) -> list[Finding]:
     out = []
-    for pair, thick, chance in zip(found.pairs, found.thickness, found.probability, strict=True):
-        name, thin = joint_name(columns, pair), thick < required
-        likely = np.isfinite(thick) & ~thin & (chance > allowed)
+    all_thin = found.thickness < required
+    all_likely = np.isfinite(found.thickness) & ~all_thin & (found.probability > allowed)
+    for j in np.flatnonzero((all_thin | all_likely).any(axis=1)).tolist():
+        name, thick, chance = joint_name(columns, found.pairs[j]), found.thickness[j], found.probability[j]
+        thin, likely = all_thin[j], all_likely[j]
         for first, last in true_runs(thin):
             top, bottom, least = (
                 float(columns.depths[first]),
@@ -223,14 +226,15 @@ def _joint_findings(columns: Columns, found: Joints, required: float, allowed: f
 def _design_findings(columns: Columns, found: Joints, required: float, allowed: float) -> list[Finding]:
     """Where a joint is not good and could not be by its design: a column that does not reach, or axes too far apart."""
     out = []
-    a, b = found.pairs[:, 0], found.pairs[:, 1]
-    apart = np.linalg.norm(columns.planned[b] - columns.planned[a], axis=-1)
-    limit = limit_distances(columns.radii[a], columns.radii[b], required)
     with np.errstate(invalid="ignore"):
         good = (found.thickness >= required) & (found.probability <= allowed)
     bad = ~good & (found.states != ColumnState.OUTSIDE)
-    for j in np.flatnonzero(np.any(bad, axis=1)).tolist():
-        pair = found.pairs[j]
+    joints = np.flatnonzero(np.any(bad, axis=1))
+    pairs, bad = found.pairs[joints], bad[joints]
+    a, b = pairs[:, 0], pairs[:, 1]
+    apart = np.linalg.norm(columns.planned[b] - columns.planned[a], axis=-1)
+    limit = limit_distances(columns.radii[a], columns.radii[b], required)
+    for j, pair in enumerate(pairs):
         name = joint_name(columns, pair)
         for k in pair.tolist():
             for first, last in true_runs(bad[j] & (columns.states[k] == ColumnState.OUTSIDE)):
@@ -242,11 +246,16 @@ def _design_findings(columns: Columns, found: Joints, required: float, allowed: 
         wide = bad[j] & (apart[j] > limit[j] + 1e-9)
         for first, last in true_runs(wide):
             top, bottom = float(columns.depths[first]), float(columns.depths[last])
-            most = first + int(np.argmax(apart[j, first : last + 1]))
-            text = (
-                f"the design of joint {name} opens from {top:g} to {bottom:g} m: its axes are up to "
-                f"{apart[j, most]:.3f} m apart, a joint of {required:g} m needs {limit[j, most]:.3f} m or less"
-            )
+            most = first + int(np.argmax((apart[j] - limit[j])[first : last + 1]))
+            text = f"the design of joint {name} opens from {top:g} to {bottom:g} m: "
+            if limit[j, most] > 0.0:
+                text += (
+                    f"its axes are up to {apart[j, most]:.3f} m apart, a joint of {required:g} m needs "
+                    f"{limit[j, most]:.3f} m or less"
+                )
+            else:
+                radius = float(np.min(columns.radii[pair, most]))
+                text += f"a column of {radius:g} m radius makes no joint of {required:g} m"
             out.append(Finding(FindingKind.DESIGN, name, top, bottom, text))
     return out
 

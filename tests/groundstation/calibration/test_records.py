@@ -16,6 +16,7 @@ POS_NEG = "axis,x_pos,x_neg,y_pos,y_neg,z_pos,z_neg"
 CW_ACW = "axis,x_cw,x_acw,y_cw,y_acw,z_cw,z_acw"
 ROWS = ["x,100,-100,1,2,3,4", "y,5,6,100,-100,7,8", "z,9,10,11,12,100,-100"]
 ATTITUDES = "position,pitch_deg,roll_deg,ax_mps2,ay_mps2,az_mps2"
+IN_G = "position,pitch_deg,roll_deg,ax_g,ay_g,az_g"
 POSES = ["home,0,0,0,0,9.81", "1,30,0,4.9,0,8.5", "2,0,30,0,4.9,8.5", "3,-30,0,-4.9,0,8.5", "4,0,-30,0,-4.9,8.5"]
 TEXTS = {"table": [POS_NEG, *ROWS], "poses": [ATTITUDES, *POSES]}
 
@@ -88,7 +89,9 @@ def test_a_file_that_is_not_there(tmp_path: Path, kind: str) -> None:
     assert message == "bench.csv: expected a file to read, got No such file or directory"
 
 
-@pytest.mark.parametrize(("kind", "expected"), [("table", f"{POS_NEG} or {CW_ACW}"), ("poses", ATTITUDES)])
+@pytest.mark.parametrize(
+    ("kind", "expected"), [("table", f"{POS_NEG} or {CW_ACW}"), ("poses", f"{ATTITUDES} or {IN_G}")]
+)
 @pytest.mark.parametrize("header", ["axis,x,y,z", "x,y", "position,pitch_rad,roll_rad,ax_mps2,ay_mps2,az_mps2"])
 def test_a_wrong_header(tmp_path: Path, kind: str, expected: str, header: str) -> None:
     message = refusal(file(tmp_path, "# bench", header, "1,2,3"), kind)
@@ -97,7 +100,7 @@ def test_a_wrong_header(tmp_path: Path, kind: str, expected: str, header: str) -
 
 def test_only_comments(tmp_path: Path) -> None:
     message = refusal(file(tmp_path, "# nothing came"), "poses")
-    assert message == f"bench.csv, line 1: expected the header {ATTITUDES}, got only comments"
+    assert message == f"bench.csv, line 1: expected the header {ATTITUDES} or {IN_G}, got only comments"
 
 
 def test_a_header_alone(tmp_path: Path) -> None:

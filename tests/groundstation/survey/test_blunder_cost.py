@@ -13,8 +13,9 @@ from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunder_cost import cost_blunders
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
-from groundstation.survey.adjustment.blunder_words import ADVICE, MISTAKES
-from groundstation.survey.adjustment.blunders import examine_hole
+from groundstation.survey.adjustment.blunder_words import ADVICE, MISTAKES, advise_crew
+from groundstation.survey.adjustment.blunders import Blunder, Explanation, examine_hole
+from groundstation.survey.adjustment.hypotheses import Hypothesis, all_hypotheses
 from groundstation.survey.adjustment.least_found import LARGEST, possible_mistakes, unfound_across, worst_of_kinds
 from groundstation.survey.adjustment.looks import Looks
 from groundstation.survey.adjustment.reliability import measure_reliability
@@ -87,3 +88,19 @@ def test_every_kind_has_its_advice_and_every_possible_mistake_its_name_and_size(
     assert set(ADVICE) == set(BlunderKind)
     kinds = {one.kind for one in possible_mistakes(drawn.looks, drawn.run)}
     assert kinds == set(MISTAKES) == set(LARGEST)
+
+
+def test_of_every_kind_a_crew_is_told_what_to_do_whatever_the_number_of_its_tubes() -> None:
+    """Stations are counted, too: there are more of them than tubes, and one that moved is no tube."""
+    drawn = draw_string(5)
+    subjects = {one.kind: one.subject for one in all_hypotheses(drawn.looks, drawn.run)}
+    subjects[BlunderKind.HOLE_MOVED] = (int(drawn.looks.station.max()) - 1, int(drawn.looks.station.max()))
+    names = [f"<{place}>" for place in range(int(drawn.looks.tube.max()) + 1)]
+    assert subjects[BlunderKind.HOLE_MOVED][1] >= len(names)
+    for kind in BlunderKind:
+        subject = subjects.get(kind, ())
+        best = Explanation(Hypothesis(kind, subject), np.ones(1), np.eye(1), -50.0)
+        advice = advise_crew(Blunder(best, None, 2.0, 1.0), names)
+        shown = {place for place, name in enumerate(names) if name in advice}
+        assert advice
+        assert shown <= (set() if kind is BlunderKind.HOLE_MOVED else set(subject))

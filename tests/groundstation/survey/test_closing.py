@@ -1,6 +1,7 @@
 """How a ring closes in the order in which its columns were drilled."""
 
 import math
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from groundstation.errors import SurveyError
 from groundstation.survey.wall.as_built import Columns
 from groundstation.survey.wall.closing import ClosingDay, closing_by_day
+from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.wall_file import read_wall
 from groundstation.survey.wall.wall_joints import Detour
 
@@ -80,3 +82,29 @@ def test_without_a_day_nothing_is_said_of_time(tmp_path: Path) -> None:
 def test_a_day_that_cannot_be_is_refused_with_its_line(tmp_path: Path) -> None:
     with pytest.raises(SurveyError, match=r"line 3: column P2: drilled_on: expected a day as 2026-11-20, got 'May'"):
         ring(tmp_path, [DAYS[0], "May", *DAYS[2:]])
+
+
+def row_of_three(days: list[date]) -> tuple[Columns, list[ClosingDay]]:
+    """Three columns 0.7 and 1.2 m apart, and how they close to joints of 0.1 m."""
+    heads, depths = np.array([[0.0, 0.0], [0.0, 0.7], [0.0, 1.9]]), np.array([0.0, 1.0])
+    columns = Columns.surveyed(
+        ["A", "B", "C"], depths, np.repeat(heads[:, None], 2, axis=1), np.zeros((3, 2, 2, 2)), heads, 0.7
+    )
+    return columns, closing_by_day(columns, np.array([[0, 1], [1, 2]]), 0.1, days)
+
+
+def test_the_widest_spacing_of_a_day_is_of_columns_that_were_drilled_then() -> None:
+    _, found = row_of_three([date(2026, 11, 10), date(2026, 11, 10), date(2026, 11, 12)])
+    assert [stage.widest for stage in found] == [(0, 0, pytest.approx(0.7)), (1, 0, pytest.approx(1.2))]
+
+
+def test_what_is_drilled_and_not_surveyed_closes_its_joints_too() -> None:
+    days = [date(2026, 11, 10)] * 3
+    columns, surveyed = row_of_three(days)
+    states = columns.states.copy()
+    states[1, 1] = ColumnState.UNSURVEYED
+    drilled = closing_by_day(replace(columns, states=states), np.array([[0, 1], [1, 2]]), 0.1, days)
+    assert drilled == surveyed
+    assert surveyed[-1].closed == 1.0
+    states[1, 1] = ColumnState.MISSING
+    assert closing_by_day(replace(columns, states=states), np.array([[0, 1], [1, 2]]), 0.1, days)[-1].closed == 0.5

@@ -164,3 +164,18 @@ def test_many_wells_at_once_give_what_each_gives(name: str) -> None:
         np.testing.assert_allclose(together.cov[at], alone.cov, rtol=1e-10, atol=1e-15)
         for source, cov in alone.by_source().items():
             np.testing.assert_allclose(sources[source][at], cov, rtol=1e-10, atol=1e-15)
+
+
+@pytest.mark.parametrize("mode", [PropagationMode.RANDOM, PropagationMode.SYSTEMATIC])
+@pytest.mark.parametrize("f", [0.2, 0.5, 0.9])
+def test_where_the_surface_errs_as_the_first_reading_the_first_leg_does_not_bow(
+    mode: PropagationMode, f: float
+) -> None:
+    """Both ends of the leg turn alike, so it moves as a stick does; without that allowance it bows."""
+    tool = tool_of(angle_term("E", 0.01, mode, "1"))
+    survey = hand_well(4)
+    stick, bowed = (propagate_errors(survey, [Leg(tool)], SITE, slot_allowance=slot) for slot in (True, False))
+    md = f * float(survey.md[1])
+    np.testing.assert_allclose(covariance_at(stick, md), f**2 * stick.cov[1], rtol=1e-9, atol=1e-18)
+    # by minimum curvature the direction errs by e s / L, so the place by e s^2 / 2 L and the station by e L / 2
+    np.testing.assert_allclose(covariance_at(bowed, md), f**4 * bowed.cov[1], rtol=1e-9, atol=1e-18)

@@ -1,7 +1,9 @@
 """Every number that enters: values that stand for none, ranges, what hardly can be, in surveys and walls."""
 
+import dataclasses
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from borechain import api
 from groundstation.calibration.calibration_records import read_turn_table
 from groundstation.entry.null_values import is_null, null_or_number
 from groundstation.entry.station_plausibility import station_warnings
@@ -21,10 +24,11 @@ from groundstation.survey.requests.wall_result import wall_result
 from groundstation.survey.wall.judged_wall import judge_wall, part_around
 from groundstation.survey.wall.wall_file import read_wall
 from groundstation.survey.wall.wall_verdict import FindingKind, WallVerdict
+from groundstation.survey.well.error_sources import Site
 from telemetry.errors import CalibrationError
 
 HEAD = "MD (m),Inc (deg),Azi (deg)\n"
-NULLS = ("-999.25", "-9999", "-99999", "-999.2500", "1e30", "1E+30", "", "-", "N/A", "null")
+NULLS = ("-999.25", "-9999", "-99999", "-999.2500", "1e30", "1E+30", "-1e30", "-1E+31", "", "-", "N/A", "null")
 SITE = SiteFigures()
 
 
@@ -129,6 +133,16 @@ def test_what_steel_hardly_does_is_a_warning(tmp_path: Path, rows: str, kind: st
     assert all("deg" in warning["text"] for warning in found)
 
 
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize(("between", "kinds"), [(20.0, []), (22.0, ["spike"])])
+def test_a_station_is_alone_where_it_departs_from_both_its_neighbours(
+    way: int, between: float, kinds: list[str]
+) -> None:
+    """11.6 and 10 deg: 8.4 and 10 deg from 20, where 9.8 are allowed on both sides; a hole is the same upside down."""
+    md, inclination = np.array([0.0, 30.0, 60.0]), np.radians([10.0, between, 11.6])[::way]
+    assert [warning.kind for warning in station_warnings(md, inclination, np.zeros(3), "h")] == kinds
+
+
 @given(st.lists(st.tuples(st.floats(0.2, 30.0), st.floats(-1.0, 1.0), st.floats(0.0, 360.0)), min_size=2, max_size=30))
 def test_a_hole_that_bends_as_steel_does_has_no_warning(steps: list[tuple[float, float, float]]) -> None:
     md = np.cumsum([0.0, *(length for length, _, _ in steps)])
@@ -229,6 +243,121 @@ def test_a_warning_below_what_is_to_be_tight_is_named_and_touches_nothing(tmp_pa
     wall = read_wall(wall_of(tmp_path, stations, more="tight_from_m = 0\ntight_to_m = 8\n"))
     assert [warning.kind for warning in wall.warnings] == ["dogleg"]
     assert judge_wall(wall).verdict is WallVerdict.TIGHT
+
+
+@pytest.mark.parametrize("cell", ["-999.25", "9999", "1e30", "nan", "-0.1", "", "x"])
+@pytest.mark.parametrize("name", ["sigma_yaw_deg", "sigma_systematic_deg", "sigma_force_mps2", "measurements"])
+def test_a_sigma_of_a_station_that_is_none_is_refused(tmp_path: Path, name: str, cell: str) -> None:
+    """It would be a covariance of nothing, or of thousands of degrees, without a word."""
+    rows = f"0,0,0,\n10,1,40,2\n20,1,40,{cell}\n"
+    if (name, cell) == ("measurements", "9999"):
+        assert answer(tmp_path, f"md_m,inclination_deg,azimuth_deg,{name}\n{rows}")["warnings"] == []
+        return
+    with pytest.raises(SurveyError) as error:
+        answer(tmp_path, f"md_m,inclination_deg,azimuth_deg,{name}\n{rows}")
+    assert f"line 4: {name}" in str(error.value) or f"line 4: expected numbers, got {name}" in str(error.value)
+
+
+def test_the_collar_has_no_sigma_of_its_own_and_a_column_may_be_empty(tmp_path: Path) -> None:
+    head = "md_m,inclination_deg,azimuth_deg,sigma_yaw_deg\n"
+    told, own, none = (
+        answer(tmp_path, f"{head}0,0,0,{a}\n10,1,40,{b}\n20,1,40,{b}\n") for a, b in (("", 2), (2, 2), ("", ""))
+    )
+    assert told["stations"] == own["stations"]
+    assert none["stations"][-1]["uncertainty"] != own["stations"][-1]["uncertainty"]
+
+
+@pytest.mark.parametrize(
+    ("key", "cell", "named"),
+    [
+        ("azimuth_deg", "-999.25", "azimuth_deg: expected a number, or nothing, got '-999.25', which stands for no"),
+        ("azimuth_deg", "9999", "azimuth_deg: expected a number, or nothing, got '9999', which stands for no value"),
+        ("azimuth_deg", "900", "azimuth_deg: expected an azimuth of -720..720 deg, got 900"),
+        ("inclination_deg", "450", "inclination_deg: expected an inclination of 0..180 deg, got 450"),
+        ("length_m", "1e30", "length_m: expected a number, or nothing, got '1e30', which stands for no value"),
+        ("length_m", "1e6", "length_m: expected a depth or a length of -100000..100000 m, got 1e+06"),
+        ("down_m", "1e30", "down_m: expected a number, or nothing"),
+        ("radius_m", "1e30", "radius_m: expected a number, or nothing"),
+    ],
+)  # fmt: skip
+def test_a_head_whose_value_is_none_is_refused(tmp_path: Path, key: str, cell: str, named: str) -> None:
+    with pytest.raises(SurveyError) as error:
+        read_wall(wall_of(tmp_path, heads=f"column,north_m,east_m,{key}\nA,0,0,\nB,0,0.7,{cell}\nC,0,1.4,\n"))
+    assert f"line 3: column B: {named}" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "most"),
+    [
+        ("tight_to_m = 1e30", 100_000), ("tight_from_m = 1e30", 100_000), ("depth_step_m = 9999", 10),
+        ("head_sigma_m = 1e30", 100_000), ("northing_m = 1e30\neasting_m = 0\nheight_m = 0", 1e8),
+    ],
+)  # fmt: skip
+def test_a_figure_of_a_wall_beyond_its_range_is_refused(tmp_path: Path, line: str, most: float) -> None:
+    key = line.partition(" ")[0]
+    with pytest.raises(SurveyError, match=rf"wall\.toml: {key}: expected at most {re.escape(format(most, 'g'))}, got"):
+        read_wall(wall_of(tmp_path, more=line))
+
+
+def test_a_wall_whose_plan_no_string_follows_is_not_tight(tmp_path: Path) -> None:
+    file_of(tmp_path, "md_m,inclination_deg,azimuth_deg\n0,0,0\n5,0.1,40\n5.5,3,40\n6,0.1,40\n10,0.1,40\n", "plan.csv")
+    path = wall_of(tmp_path, more='plan = "plan.csv"\n')
+    path.write_text(path.read_text().replace("length_m = 10\n", ""))
+    judgement = judge_wall(read_wall(path))
+    assert judgement.verdict is not WallVerdict.TIGHT
+    texts = [finding.text for finding in judgement.findings if finding.kind is FindingKind.IMPLAUSIBLE]
+    assert [text for text in texts if "A: its design bends by 5.8 deg a metre at 5 m" in text]
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("azimuth_deg = -999.25", "azimuth_deg: expected a number, got -999.25, which stands for no value"),
+        ("north_m = 1e30", "north_m: expected a number, got 1e+30, which stands for no value"),
+        ("md_m = -9999", "md_m: expected a number, got -9999, which stands for no value"),
+    ],
+)
+def test_a_tie_on_of_no_values_is_refused(tmp_path: Path, text: str, named: str) -> None:
+    lines = {key: f"{key} = 0" for key in ("md_m", "inclination_deg", "azimuth_deg", "north_m", "east_m", "tvd_m")}
+    tie = file_of(tmp_path, "\n".join((lines | {text.partition(" ")[0]: text}).values()), "tie.toml")
+    with pytest.raises(SurveyError) as error:
+        answer(tmp_path, f"{HEAD}0,0,0\n10,2,40\n", tie_on=tie)
+    assert named in str(error.value)
+
+
+def test_a_place_is_in_radians() -> None:
+    place = SiteFigures(9.8, 49_000.0, 60.0, 3.0, 45.0).to_site()
+    expected = Site(9.8, 49_000.0, math.pi / 3.0, math.pi / 60.0, math.pi / 4.0)
+    assert dataclasses.astuple(place) == pytest.approx(dataclasses.astuple(expected), rel=1e-12)
+
+
+def test_places_beyond_the_earth_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(SurveyError, match=r"--origin: expected a coordinate of -1e\+08\.\.1e\+08 m, got 1e\+30"):
+        answer(tmp_path, f"{HEAD}0,0,0\n10,2,40\n", frame=FrameRequest(origin=(1e30, 0.0, 0.0)))
+    one = file_of(tmp_path, f"{HEAD}0,0,0\n10,2,40\n", "one.csv")
+    with pytest.raises(SurveyError, match=r"--offset-head: expected a distance of -1e\+06\.\.1e\+06 m, got 1e\+30"):
+        answer_clearance(ClearanceRequest(one, one, offset_head=(0.0, 1e30, 0.0)))
+
+
+def test_the_library_reads_by_the_same_reader(tmp_path: Path) -> None:
+    """``api.survey``: formats, ranges, values for none, plausibility, and no magnetic tool without its site."""
+    book = file_of(tmp_path, "site 7\nMD;Incl (deg);Azim (deg)\n0;0;0\n10;2;40\n20;-999.25;40\n30;2;40\n")
+    with pytest.warns(UserWarning, match=r"s\.csv: line 5: Incl \(deg\) = '-999.25' stands for no value") as told:
+        found = api.survey(book)
+    assert len(told) == 1
+    np.testing.assert_array_equal(found.md, [0.0, 10.0, 30.0])
+    typed = file_of(tmp_path, f"{HEAD}0,0,0\n30,12,90\n60,123,90\n90,12.4,90\n")
+    with pytest.warns(UserWarning, match="departs by 111"):
+        api.survey(typed)
+    for rows, named in (("10,2,9e2", "expected an azimuth"), ("10,181,4", "expected an inclination of 0..180 deg")):
+        with pytest.raises(SurveyError, match=named):
+            api.survey(file_of(tmp_path, f"{HEAD}0,0,0\n{rows}\n20,2,4\n"))
+    two = file_of(tmp_path, "hole,MD,Inc,Azi\nA,0,0,0\nA,10,2,40\nB,20,2,40\nB,30,3,50\n")
+    with pytest.raises(SurveyError, match="hole tells 2 holes apart"):
+        api.survey(two)
+    assert len(api.survey(two, hole="A").md) == 2
+    with pytest.raises(SurveyError, match="a magnetic instrument needs its site"):
+        api.survey(two, hole="A", instrument="mwd-rev5.1")
 
 
 def test_a_clearance_names_what_hardly_can_be(tmp_path: Path) -> None:

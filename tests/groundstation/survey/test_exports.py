@@ -38,6 +38,19 @@ def hole_of(name: str, verdict: str, shift: float) -> ExportHole:
 
 
 ONE = ExportSite("wall 1", (hole_of("K1", "tight", 0.0),), "tight", "EPSG:5650", ("instrument relay",), "2026-11-27")
+TOOL = """
+[tool]
+name = "probe"
+title = "a probe"
+kind = "Inertial"
+
+[[term]]
+name = "@SUM(1)"
+value = 0.01
+unit = "deg"
+mode = "systematic"
+inclination = "1"
+"""
 TWO = dataclasses.replace(ONE, holes=(ONE.holes[0], hole_of("K2 Süd", "not proven", 0.75)))
 
 
@@ -288,7 +301,16 @@ def test_a_trajectory_has_the_covariance_of_every_station() -> None:
         assert station.matrix_cov.variance_vert_vert.value == pytest.approx(4e-4 * k)
 
 
-@pytest.mark.parametrize("text", ["=1+1", "+1+1", "@SUM(A1)", "-2+3", "\t=1"])
+def test_names_in_ags_are_not_computed_by_a_spreadsheet() -> None:
+    """A file of AGS is a table of commas and quotes, and is opened as one."""
+    hole = dataclasses.replace(ONE.holes[0], name="=1+1")
+    text = exported_bytes(dataclasses.replace(ONE, holes=(hole,), name="@SUM(A1)", client="+1"), "ags").decode()
+    cells = {cell for row in csv.reader(io.StringIO(text)) for cell in row}
+    assert {"'=1+1", "'@SUM(A1)", "+1"} <= cells  # the last is a number
+    assert not {cell for cell in cells if cell.startswith(("=", "@"))}
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+1+1", "@SUM(A1)", "-2+3", "\t=1", "\r=1", "\n=1"])
 def test_text_that_begins_like_a_formula_is_quoted(text: str) -> None:
     assert quoted_cell(text) == f"'{text}"
     assert [quoted_cell(x) for x in ("plain", "-12.5", -12.5, None)] == ["plain", "-12.5", -12.5, None]
@@ -316,3 +338,14 @@ def test_the_command_writes_every_format_and_quotes_what_a_spreadsheet_would_com
     run("survey", record, "--out", table, "--origin", 1, 2, 3, "--height-datum", "=cmd|'/c calc'!A1")
     with table.open() as file:
         assert {row["height_datum"] for row in csv.DictReader(file)} == {"'=cmd|'/c calc'!A1"}
+    parts = tmp_path / "parts.csv"
+    tool = tmp_path / "tool.toml"
+    tool.write_text(TOOL)
+    done = run(
+        "survey", record, "--by-source", parts, "--instrument", tool, "--origin", 1, 2, 3, "--height-datum", "=1+1"
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    with parts.open() as file:
+        rows = list(csv.DictReader(file))
+    assert {row["height_datum"] for row in rows} == {"'=1+1"}
+    assert "'@SUM(1)" in {row["source"] for row in rows}

@@ -12,9 +12,7 @@ from groundstation.errors import SurveyError
 from groundstation.survey.files.survey_records import (
     DisplacementRule,
     read_columns,
-    read_displacements,
     read_record,
-    read_stations,
 )
 from groundstation.survey.well.well_record import SurveyRecord
 
@@ -79,7 +77,7 @@ def test_other_columns_of_numbers_and_the_lines_are_kept(tmp_path: Path) -> None
 )
 def test_north_is_minus_b_and_east_is_plus_a(tmp_path: Path, a_cm: float, b_cm: float, azimuth_deg: float) -> None:
     for rule in DisplacementRule:
-        record = read_displacements(file(tmp_path, f"md_m,a_cm,b_cm\n0,0,0\n2,{a_cm},{b_cm}\n"), rule)
+        record = read_record(file(tmp_path, f"md_m,a_cm,b_cm\n0,0,0\n2,{a_cm},{b_cm}\n"), rule)
         assert math.degrees(record.azimuth[1]) == pytest.approx(azimuth_deg)
 
 
@@ -87,20 +85,20 @@ def test_north_is_minus_b_and_east_is_plus_a(tmp_path: Path, a_cm: float, b_cm: 
 @given(a_cm=st.floats(-50.0, 50.0), b_cm=st.floats(-50.0, 50.0))
 @example(a_cm=-1e-20, b_cm=-1.0)
 def test_an_azimuth_of_displacements_lies_within_one_turn(tmp_path: Path, a_cm: float, b_cm: float) -> None:
-    azimuth = read_displacements(file(tmp_path, f"md_m,a_cm,b_cm\n0,0,0\n2,{a_cm!r},{b_cm!r}\n")).azimuth[1]
+    azimuth = read_record(file(tmp_path, f"md_m,a_cm,b_cm\n0,0,0\n2,{a_cm!r},{b_cm!r}\n")).azimuth[1]
     assert 0.0 <= azimuth < math.tau
     size = math.hypot(a_cm, b_cm)
     np.testing.assert_allclose([size * math.cos(azimuth), size * math.sin(azimuth)], [-b_cm, a_cm], atol=1e-12 * 50)
 
 
 def test_a_displacement_is_read_over_the_interval_before_it(tmp_path: Path) -> None:
-    record = read_displacements(file(tmp_path, "md_m,a_cm,b_cm\n1,0,0\n2,10,0\n6,10,0\n"))
+    record = read_record(file(tmp_path, "md_m,a_cm,b_cm\n1,0,0\n2,10,0\n6,10,0\n"))
     np.testing.assert_allclose(np.sin(record.inclination), [0.0, 0.1, 0.025])
 
 
 def test_stations_come_in_radians_whatever_the_order_of_the_columns(tmp_path: Path) -> None:
     text = "# site 7\nazimuth_deg, depth_note ,md_m,inclination_deg\n\n350,ok,0,0\n# half way\n10.5,why,2.5,179\n"
-    record = read_stations(file(tmp_path, text))
+    record = read_record(file(tmp_path, text))
     np.testing.assert_array_equal(record.md, [0.0, 2.5])
     np.testing.assert_allclose(np.degrees(record.inclination), [0.0, 179.0])
     np.testing.assert_allclose(np.degrees(record.azimuth), [350.0, 10.5])
@@ -201,18 +199,22 @@ def test_a_file_that_is_missing_or_is_no_text_is_refused(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("read", "text", "message"),
+    ("text", "message"),
     [
-        (read_stations, MEASURED, "expected the columns md_m, inclination_deg, azimuth_deg, got md_m, a_cm, b_cm"),
-        (read_displacements, GOOD, "expected the columns md_m, a_cm, b_cm, got md_m, inclination_deg, azimuth_deg"),
-        (read_stations, GOOD.replace("_deg", "_rad"), "inclination_rad is in another unit, expected inclination_deg"),
-        (read_displacements, MEASURED.replace("_cm", "_in"), "a_in is in another unit, expected a_cm"),
+        (GOOD.replace("_deg", "_rad"), "inclination_rad is in another unit, expected inclination_deg"),
+        (MEASURED.replace("_cm", "_in"), "a_in is in another unit, expected a_cm"),
     ],
 )
-def test_a_record_of_the_other_kind_is_refused_by_name(tmp_path: Path, read: object, text: str, message: str) -> None:
-    assert callable(read)
+def test_a_record_in_another_unit_is_refused_by_name(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(SurveyError, match=message):
-        read(file(tmp_path, text))
+        read_record(file(tmp_path, text))
+
+
+@pytest.mark.parametrize("cell", ["-999.25", "9999", "-9999"])
+def test_a_displacement_that_stands_for_none_is_named(tmp_path: Path, cell: str) -> None:
+    """Over 200 m a displacement of 99.99 m would do."""
+    with pytest.raises(SurveyError, match=rf"line 3: a_cm = {cell} stands for no value; without a displacement"):
+        read_record(file(tmp_path, f"md_m,a_cm,b_cm\n0,0,0\n200,{cell},1\n400,1,1\n"))
 
 
 def refusal(path: Path, rule: DisplacementRule) -> str:
@@ -300,7 +302,7 @@ ASCENDING = st.lists(
 def test_every_good_survey_comes_back_to_the_last_bit(tmp_path: Path, rows: list[tuple[float, float, float]]) -> None:
     md = np.cumsum([row[0] for row in rows])
     lines = [f"{depth!r},{row[1]!r},{row[2]!r}" for depth, row in zip(md.tolist(), rows, strict=True)]
-    record = read_stations(file(tmp_path, "\n".join(["md_m,inclination_deg,azimuth_deg", *lines])))
+    record = read_record(file(tmp_path, "\n".join(["md_m,inclination_deg,azimuth_deg", *lines])))
     np.testing.assert_array_equal(record.md, md)
     np.testing.assert_array_equal(record.inclination, np.radians([row[1] for row in rows]))
     np.testing.assert_array_equal(record.azimuth, np.radians([row[2] for row in rows]))

@@ -215,3 +215,12 @@ def test_the_bow_is_the_mean_square_of_what_the_circle_leaves_the_line_by(
     bow = bows_of(tangent[None], np.array([(sigma_deg * DEG) ** 2]))[0]
     assert bow[0, 0] == pytest.approx(np.mean((s * (np.cos(errors) - 1.0)) ** 2), rel=0.03)
     assert np.count_nonzero(bow) == 1
+
+
+@pytest.mark.parametrize("lean", [0.0, 1e-4, 0.01, 1.0])
+def test_no_azimuth_is_said_to_be_known_worse_than_not_at_all(lean: float) -> None:
+    tangent = np.array([0.6 * lean, 0.8 * lean, math.sqrt(1.0 - lean**2)])
+    cov = 1e-4 * (np.eye(3) - np.outer(tangent, tangent))
+    ((inclination_std, azimuth_std),) = stds_of_directions([bare_direction(tangent, cov)])
+    assert inclination_std == pytest.approx(0.01)
+    assert azimuth_std == pytest.approx(min(0.01 / max(lean, 1e-12), math.pi))

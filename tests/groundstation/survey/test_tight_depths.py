@@ -151,6 +151,25 @@ def test_level_heads_of_a_raked_wall_are_not_a_step(tmp_path: Path, azimuth: flo
     )
 
 
+FLAT = [61.0, 85.0, 90.0, 90.2, 110.0]  # deg
+
+
+@pytest.mark.parametrize("rake", FLAT)
+def test_a_short_column_of_a_flat_wall_is_no_level_ground(tmp_path: Path, rake: float) -> None:
+    """Toes of horizontal columns lie level, however short one of them is."""
+    rows = [(name, 0.0, 0.75 * k, 0.0, 20.0 - 10.0 * (name == "B"), rake, 0.0) for k, name in enumerate("ABC")]
+    with pytest.raises(SurveyError, match="to be tight from 0 to 20 m, yet by its design column B ends at 10 m"):
+        read_wall(made(tmp_path, rows))
+
+
+@pytest.mark.parametrize("rake", FLAT)
+def test_a_head_further_in_opens_a_flat_wall_at_the_top(tmp_path: Path, rake: float) -> None:
+    rows = [(name, 5.0 * (name == "B"), 0.75 * k, 0.0, 20.0, rake, 0.0) for k, name in enumerate("ABC")]
+    begins = 5.0 * math.sin(math.radians(rake))
+    with pytest.raises(SurveyError, match=f"column B begins at {begins:g} m: it opens at the top"):
+        read_wall(made(tmp_path, rows))
+
+
 def test_ends_of_a_range(tmp_path: Path) -> None:
     assert TightRange(None, 3.0).top is None
     with pytest.raises(SurveyError, match="expected a depth above tight_to_m"):

@@ -97,3 +97,18 @@ def test_the_plane_is_open_where_no_disc_holds_the_point_of_equal_power(seed: in
         if np.nanmin(np.abs([*powers, *turns])) > 1e-6:  # what the digits of site coordinates tell apart
             among = np.all(turns > 0.0) or np.all(turns < 0.0)
             assert found[s, z] == (among and powers[0] > 0.0 and not np.any(powers[3:] < 0.0))
+
+
+def test_a_wide_column_covers_a_void_from_afar() -> None:
+    """Three columns too thin to meet; the middle between them lies in one of 2 m radius, 1.9 m away."""
+    heads = np.array([*HEADS[:3], [-1.2, -1.2]])
+    found = four((0.0, 0.0))
+    centres, middle = np.repeat(heads[:, None], 2, axis=1), np.array([SPACING / 2, SPACING / 2])
+    radii = np.repeat(
+        np.array([0.45, 0.45, 0.45, 2.0 + float(np.linalg.norm(heads[3] - middle)) - 1.9])[:, None], 2, axis=1
+    )
+    moved = replace(found, centres=centres, planned=centres, designs=heads, radii=radii)
+    assert float(np.linalg.norm(heads[3] - middle)) > 2.0
+    np.testing.assert_array_equal(void_chance(moved, np.array([[0, 1, 2]])).probability, 0.0)
+    radii[3] = float(np.linalg.norm(heads[3] - middle)) - 0.2  # and does not reach it
+    np.testing.assert_array_equal(void_chance(moved, np.array([[0, 1, 2]])).probability, 1.0)

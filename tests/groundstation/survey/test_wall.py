@@ -10,6 +10,7 @@ from groundstation.survey.wall.as_built import Columns, Cut, intersect_planes
 from groundstation.survey.wall.column_joint import joint_thickness
 from groundstation.survey.wall.plane_errors import PlaneErrors
 from groundstation.survey.wall.wall_joints import (
+    crossed_joints,
     extra_column,
     judge_joints,
     neighbours_in_grid,
@@ -271,3 +272,30 @@ def test_a_void_is_told_of_a_hole_whose_plan_comes_to_it(own_plan: tuple[float, 
     columns = replace(columns, designs=designs, planned=planned)
     found = judge_columns(columns, np.array([[4, 5]]), 0.8, grid_spacing=0.75, about=4)
     assert [void.depth for void in found.voids] == ([0.0, 1.0, 2.0] if is_told else [])
+
+
+def test_columns_that_cross_by_their_design_have_not_changed_sides() -> None:
+    """Of two that are raked across each other; the third crosses where its design does not."""
+    heads = np.array([[0.0, 0.0], [0.0, 0.4], [0.0, 0.8]])
+    rake = np.linspace(0.0, 0.9, len(DEPTHS))
+    planned = np.repeat(heads[:, None], len(DEPTHS), axis=1)
+    planned[0, :, 1] += rake
+    columns = Columns.surveyed(["A", "B", "C"], DEPTHS, planned, np.zeros((3, len(DEPTHS), 2, 2)), heads, RADIUS)
+    pairs = neighbours_in_line(3, closed=False)
+    assert crossed_joints(replace(columns, planned=planned), pairs) == []
+    joint, depth = crossed_joints(columns, pairs)[0]  # with upright designs
+    assert joint == 0
+    assert rake[depth - 1] <= 0.4 < rake[depth]
+
+
+def test_an_extra_column_stands_where_its_furthest_neighbour_is_nearest() -> None:
+    """A neighbour that bulges at one depth alone: the mean of its places is not where one column joins it there."""
+    columns, pairs = wall(0.0, count=3)
+    centres = columns.centres.copy()
+    centres[1, :, 1] -= 0.35
+    centres[1, 30, 1] -= 0.3
+    bulged = replace(columns, centres=centres)
+    extra = extra_column(bulged, judge_joints(bulged, pairs, REQUIRED), 1, REQUIRED)
+    assert extra is not None
+    middles = 0.5 * (centres[1, :, 1] + centres[2, :, 1])
+    assert extra.east == pytest.approx(0.5 * (middles.min() + middles.max()), abs=1e-9)

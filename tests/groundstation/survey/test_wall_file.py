@@ -112,7 +112,7 @@ def test_a_grid_with_good_joints_has_a_void_in_every_cell(tmp_path: Path) -> Non
     heads = "column,north_m,east_m\n" + "".join(
         f"C{3 * a + b + 1},{0.9 * a},{0.9 * b}\n" for a in range(3) for b in range(3)
     )
-    path = made(tmp_path, heads, holes(9), thickness=0.5, more='layout = "grid"\nspacing_m = 0.9\ndepth_step_m = 5')
+    path = made(tmp_path, heads, holes(9), thickness=0.5, more='layout = "grid"\nspacing_m = 0.9\ndepth_step_m = 2')
     _, found = judged(path)
     assert not np.any(found.joints.thickness < 0.5)
     assert found.verdict is WallVerdict.NOT_TIGHT
@@ -125,7 +125,7 @@ def test_a_grid_that_covers_its_plane_is_tight(tmp_path: Path) -> None:
     heads = "column,north_m,east_m\n" + "".join(
         f"C{3 * a + b + 1},{0.7 * a},{0.7 * b}\n" for a in range(3) for b in range(3)
     )
-    _, found = judged(made(tmp_path, heads, holes(9), more='layout = "grid"\nspacing_m = 0.7\ndepth_step_m = 5'))
+    _, found = judged(made(tmp_path, heads, holes(9), more='layout = "grid"\nspacing_m = 0.7\ndepth_step_m = 2'))
     assert (found.verdict, found.findings) == (WallVerdict.TIGHT, [])
 
 
@@ -213,6 +213,7 @@ def test_a_remedial_column_stands_in_for_one_that_is_not_there(tmp_path: Path) -
         (row_of(2), "", "", "length_m is missing; no column was surveyed"),
         (row_of(2), holes(2), "allowed_probability = 0.9", "allowed_probability: expected at most 0.5"),
         (row_of(2), holes(2), "[[layer]]\nradius_m = 0.5", "layer 1: from_m is missing"),
+        (row_of(2), holes(2), "[[layer]]\nfrom_m = 3\n[[layer]]\nfrom_m = 3", "expected from_m beyond 3 m, got 3 m"),
         (row_of(2), HOLE.format("C1", 0, 0, 20) + HOLE.format("C2", 88, 0, 20), "", "C2: at 0 m the hole runs"),
     ],
 )  # fmt: skip

@@ -234,3 +234,14 @@ def test_either_leg_of_a_way_by_a_remedial_column_may_be_thin() -> None:
     one = float(probability_beyond(np.array([0.0, leg]), 2.0 * std**2 * np.eye(2), limit))
     assert 0.01 < one < 0.1
     assert found.probability[0, -1] == pytest.approx(2.0 * one, rel=1e-9)
+
+
+@pytest.mark.parametrize("place", [0.6, 0.7, 0.8])
+def test_a_way_by_a_remedial_column_is_as_thick_as_its_thinner_leg(place: float) -> None:
+    heads = np.array([[0.0, 0.0], [0.0, 1.4], [0.0, place]])
+    columns = columns_of(heads, 0.01)
+    direct = judge_joints(columns, np.array([[0, 1]]), REQUIRED)
+    found = with_detours(columns, direct, [Detour(0, np.array([[0, 2], [2, 1]]))], REQUIRED)
+    longer = max(place, 1.4 - place)
+    np.testing.assert_allclose(found.distance, longer)
+    np.testing.assert_allclose(found.thickness, 2.0 * math.sqrt(RADIUS**2 - 0.25 * longer**2))

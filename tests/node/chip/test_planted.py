@@ -44,13 +44,17 @@ def plant_switches(code: str, random: np.random.Generator) -> tuple[str, int]:
     lines = code.split("\n")
     first = next(k for k, line in enumerate(lines) if line.startswith("static const")) if "static const" in code else 0
     found: list[tuple[int, int, int, str]] = []
-    inside = False
+    inside, structs = False, set(re.findall(r"struct \w+ (\w+)", code))  # names that no number is added to
     for k, line in enumerate(lines):
         inside = (inside or line == "{") and line != "}"
         if k < first or not inside or line.lstrip().startswith(("for (", "static", "/*")):
             continue
         for pattern, made in SITES:
-            found.extend((k, match.start(), match.end(), match.expand(made)) for match in pattern.finditer(line))
+            found.extend(
+                (k, match.start(), match.end(), match.expand(made))
+                for match in pattern.finditer(line)
+                if re.match(r"\w*", line[match.end() :])[0] not in structs
+            )
     found.sort()
     chosen = sorted(random.choice(len(found), PLANTED, replace=False))
     for number in reversed(range(PLANTED)):  # from the end of the text, so that places before stay where they are
