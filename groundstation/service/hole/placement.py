@@ -70,8 +70,10 @@ class Placement:
         if not self.waiting:
             return []  # the usual case: called at every reading
         waiting, self.waiting, placeable = self.waiting, [], []
+        doubled = self._setup.doubled
         for one in waiting:
-            md = self._string.depth_of(self._setup.doubled.survey_apart(one.message), one.below)
+            m = doubled.survey_apart(one.message) if doubled.places else one.message
+            md = self._string.depth_of(m, one.below)
             if md is None:
                 self.waiting.append(one)
             else:
@@ -86,7 +88,8 @@ class Placement:
         None for each that is not fused.
         """
         fused, above, below, places, depths = [], [], [], [], []
-        for place, m in enumerate(map(self._setup.doubled.survey_apart, measurements)):
+        doubled = self._setup.doubled
+        for place, m in enumerate(map(doubled.survey_apart, measurements) if doubled.places else measurements):
             if trust_of(m.flags) not in NEVER_FUSED:
                 chain = self._string.tally.above(m.tube, m.hops)
                 fused.append(corrected_measurement(m, chain, self._setup))
@@ -108,7 +111,7 @@ class Placement:
         """Give the hole what a measurement came to; returns the kind of alarm where it is not used as it is, or ''."""
         if unused := self._unused(measurement):
             return unused
-        if self._setup.doubled.is_held(measurement):
+        if self._setup.doubled.places and self._setup.doubled.is_held(measurement):
             return ""  # it is told as an alarm of its own, once
         if found is None:
             self.refused += 1

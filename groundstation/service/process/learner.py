@@ -51,7 +51,7 @@ class Learner:
         """A message has come, to be stored with those that come beside it, a measurement with the depth it has now."""
         md = below = None
         if isinstance(message, SurveyMeasurement):
-            apart = self._string.doubled.survey_apart(message)
+            apart = self._apart(message) if self._string.doubled.places else message
             below = self._string.length_below(apart)
             md = None if below is None else self._string.depth_of(apart, below)
         self._arrived.append(Stored(message, md, below))
@@ -196,7 +196,8 @@ class Learner:
             for place, one in enumerate(some):
                 if place in placed:
                     measurement = placed[place][0]
-                    self._on_flags(measurement)
+                    apart = self._apart(measurement) if self._string.doubled.places else measurement
+                    self._setup.on_flags(apart.tube, apart.hops, apart.flags)
                     self._string.numbers.add_number(one.message.tube, one.message.sequence)
                     self._place(placed[place][0], found[place])
                 else:
@@ -218,17 +219,18 @@ class Learner:
                 self._recalibration.on_static_record(message)
                 return ("static_records",)
             case SurveyMeasurement():
-                self._on_flags(message)
-                self._string.on_measurement(self._string.doubled.survey_apart(message), is_placed=False)
+                apart = self._apart(message) if self._string.doubled.places else message
+                self._setup.on_flags(apart.tube, apart.hops, apart.flags)
+                self._string.on_measurement(apart, is_placed=False)
                 self._watch.on_measurement(message, self._placement.wait_for_depth(Stored(message, one.md, one.below)))
                 return self._by_survey
 
-    def _on_flags(self, measurement: SurveyMeasurement) -> None:
-        """Learn from a measurement which angles its node was told."""
-        apart = self._string.doubled.survey_apart(measurement)
-        self._setup.on_flags(apart.tube, apart.hops, apart.flags)
+    def _apart(self, measurement: SurveyMeasurement) -> SurveyMeasurement:
+        """A measurement under the number by which its tube is known; asked for where a number is doubled at all."""
+        return self._string.doubled.survey_apart(measurement)
 
     def _place(self, measurement: SurveyMeasurement, found: Found | None) -> None:
         """Give the hole what a measurement was resolved to."""
-        self._string.on_measurement(self._string.doubled.survey_apart(measurement), is_placed=True)
+        apart = self._apart(measurement) if self._string.doubled.places else measurement
+        self._string.on_measurement(apart, is_placed=True)
         self._watch.on_measurement(measurement, self._placement.place(measurement, found))

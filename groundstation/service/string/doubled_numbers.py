@@ -67,34 +67,35 @@ class DoubledNumbers:
 
     Attributes
     ----------
+    places : by number, in the order in which they were found; empty as long as no number is doubled
     is_upper : by number, whether the upper of both was told to be the tube; not in it before that is told
     """
 
     def __init__(self) -> None:
-        self._places: dict[int, list[DoubledPlaces]] = {}
+        self.places: dict[int, list[DoubledPlaces]] = {}
         self.is_upper: dict[int, bool] = {}
 
     def begin_anew(self, places: Iterable[tuple[int, DoubledPlaces]], is_upper: dict[int, bool]) -> None:
         """Take what stands in the book of the setup; places in the order in which they were found."""
-        self._places.clear()
+        self.places.clear()
         for tube, one in places:
-            self._places.setdefault(tube, []).append(one)
+            self.places.setdefault(tube, []).append(one)
         self.is_upper = dict(is_upper)
 
     def __bool__(self) -> bool:
-        return bool(self._places)
+        return bool(self.places)
 
     def __contains__(self, tube: int) -> bool:
-        return tube % OTHER in self._places
+        return tube % OTHER in self.places
 
     @property
     def untold(self) -> list[int]:
         """Numbers of which it was not told which of both is the tube."""
-        return sorted(self._places.keys() - self.is_upper.keys())
+        return sorted(self.places.keys() - self.is_upper.keys())
 
     def newest(self, tube: int) -> DoubledPlaces:
         """Places of a doubled number as they were found last."""
-        return self._places[tube][-1]
+        return self.places[tube][-1]
 
     def upper_of(self, tube: int) -> int:
         """Number by which the upper of both is known: its own where it was told to be the tube."""
@@ -110,22 +111,22 @@ class DoubledNumbers:
 
     def state_apart(self, state: NodeState) -> NodeState:
         """A state under the number by which its tube is known."""
-        key = self.key_of(state.tube, state.epoch, state.at, state.hops) if self._places else state.tube
+        key = self.key_of(state.tube, state.epoch, state.at, state.hops) if self.places else state.tube
         return state if key == state.tube else replace(state, tube=key)
 
     def survey_apart(self, m: SurveyMeasurement) -> SurveyMeasurement:
         """A measurement under the number by which its tube is known."""
-        key = self.key_of(m.tube, m.epoch, m.station_at, m.hops) if self._places else m.tube
+        key = self.key_of(m.tube, m.epoch, m.station_at, m.hops)
         return m if key == m.tube else replace(m, tube=key)
 
     def is_held(self, m: SurveyMeasurement) -> bool:
         """Whether a measurement is not to be fused: it is of the other one, or which one is it was not told."""
-        places = self._in_force(m.tube, m.epoch, m.station_at) if self._places else None
+        places = self._in_force(m.tube, m.epoch, m.station_at)
         return places is not None and (m.tube not in self.is_upper or self.survey_apart(m).tube != m.tube)
 
     def _in_force(self, tube: int, epoch: int, at: float) -> DoubledPlaces | None:
         """Places of a number at a time; those known last in an epoch of which none are known, None before the first."""
-        known = self._places.get(tube)
+        known = self.places.get(tube)
         if not known:
             return None
         of_epoch = [one for one in known if one.epoch == epoch]
