@@ -67,7 +67,7 @@ def test_without_transport_nothing_is_added(tmp_path: Path) -> None:
     model = model_of(tmp_path, passes(5), collar_inclination_deg=INCLINATION_DEG)
     for n, row in enumerate(rows(model), 1):
         assert (row["transport_deg"], row["sigma_transport_deg"]) == (0.0, 0.0)
-        assert row["azimuth_deg"] == pytest.approx(n * (STEP_DEG - LACKED_DEG), abs=1e-9)
+        assert row["azimuth_deg"] == pytest.approx(n * (STEP_DEG - LACKED_DEG), abs=1e-8)  # a hole is calm among others
 
 
 @pytest.mark.parametrize("seed", range(4))

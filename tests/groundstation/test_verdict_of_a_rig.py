@@ -57,7 +57,7 @@ def test_at_its_depth_the_verdict_stops_advising(rig: Rig) -> None:
         rig.drill(stop, 0.3)
     answer = rig.ask("verdict")
     assert answer["verdict"] == "on_target"
-    assert answer["line"].startswith("ON TARGET: ended 9.9 ± ")
+    assert answer["line"].startswith("ON TARGET: ended 9.8 ± ")
     assert (answer["steer"], answer["todo"]) == (None, "the hole is at its depth: nothing is left to steer")
     assert rig.ask("column")["ahead"]["within_percent"] > 99.0
 

@@ -250,14 +250,12 @@ class SecondWorld:
         fine = np.interp(np.arange(8 * len(ends) + 1) / 8.0, np.arange(len(stamps)), stamps)
         summed = np.stack([np.interp(fine, self.t, integral(v)) for v in values.T], axis=1)
         parts = np.pad((np.diff(summed[:, 2]) / np.diff(fine)).reshape(-1, 8), ((0, 0), (1, 0)))
-        if not self.what.increments:
-            parts[:] = np.nan
+        parts *= 1.0 if self.what.increments else np.nan
         return np.diff(summed[::8], axis=0) / np.diff(stamps)[:, None], nothing, nothing, parts
 
     def _read_times(self, ends: Array) -> Array:
         """When a sensor is really read (m + 1,), s, whose node believes the ``ends`` of its cycles."""
-        stamps = np.concatenate([[ends[0] - PERIOD], ends])
-        return stamps + 1e-3 * self.what.jitter_ms * self.random.standard_normal(len(stamps))
+        return np.append(ends[0] - PERIOD, ends) + self.what.jitter_ms / 1e3 * self.random.normal(size=len(ends) + 1)
 
     def _in_frames(self, values: Array, ends: Array) -> tuple[Array, Array, Array, Array]:
         """Means of the frames that a driver finds in a cycle, how late it says they are (s), its error, their parts."""
@@ -271,9 +269,8 @@ class SecondWorld:
             delay = 1.0 / (math.sqrt(2.0) * math.pi * what.low_pass_hz)
         step = 1.0 / (what.frames_hz * (1.0 + what.crystal))
         at = np.arange(self.t[0] + step * self.random.random(), self.t[-1], step)
-        frames = np.stack([np.interp(at, self.t, v) for v in values.T], axis=1)
-        white = np.concatenate([GYRO_WHITE, np.full(3, FORCE_WHITE)]) * math.sqrt(what.frames_hz)
-        frames = frames + white * self.random.standard_normal(frames.shape)
+        white = self.random.standard_normal((len(at), 6)) * np.concatenate([GYRO_WHITE, np.full(3, FORCE_WHITE)])
+        frames = np.stack([np.interp(at, self.t, v) for v in values.T], axis=1) + math.sqrt(what.frames_hz) * white
         clock, mean, late = FrameClock(what.frames_hz), np.zeros((len(ends), 6)), np.zeros((len(ends), 2))
         parts = np.full((len(ends), 9), np.nan)
         borders = np.searchsorted(at, self._read_times(ends), side="right")
