@@ -91,7 +91,7 @@ def wall(folder: Path, heads: str, stations: str, more: str = "") -> Path:
             "column,north_m,east_m,down_m\nA,0,0,\nB,0,0.7,1e9\n",
             STRAIGHT[:50],
             "",
-            "got them 0.5 m apart from 0 to 1e+09 m",
+            "down_m: expected a depth or a length of -100000..100000 m, got 1e+09",
         ),
         (
             "column,north_m,east_m,inclination_deg\nA,0,0,181\n",

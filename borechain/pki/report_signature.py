@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import datetime
 import hashlib
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -18,6 +19,7 @@ from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric.ec import ECDSA, EllipticCurvePublicKey
 from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.hazmat.primitives.serialization.pkcs7 import PKCS7Options, PKCS7SignatureBuilder
+from cryptography.utils import CryptographyDeprecationWarning
 from cryptography.x509.oid import NameOID
 
 from borechain.pki.pdf_revisions import (
@@ -133,7 +135,9 @@ def _parts_of(signature: bytes) -> tuple[x509.Certificate, bytes, bytes]:
     (signer,) = _elements(signers)
     (der,) = _elements(certificates)
     *_, attributes, _, signed = _elements(signer)
-    holder = x509.load_der_x509_certificate(der)
+    with warnings.catch_warnings():  # of a number that was changed to one below zero, which is refused just below
+        warnings.simplefilter("ignore", CryptographyDeprecationWarning)
+        holder = x509.load_der_x509_certificate(der)
     if _packed(holder, der, attributes, signed) != whole or signature[end:].strip(b"\0"):
         raise ValueError("another form of signature")
     return holder, attributes, _inside(signed)

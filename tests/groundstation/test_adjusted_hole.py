@@ -232,7 +232,7 @@ def test_north_is_in_every_position_as_it_turns_the_hole_about_the_vertical(tmp_
 
 
 def test_what_a_covariance_is_made_of_adds_up_to_it_at_every_station(tmp_path: Path) -> None:
-    """With what the collar's direction and the first leg undo of each other: it is a part of the path's."""
+    """What the collar's direction and the first legs undo of each other is taken off both; none is below zero."""
     known = ALIGNED | {"play_std_deg": 1e-4, "collar_inclination_deg": 1.0, "collar_std_deg": 0.5}
     model = knowing(tmp_path, passes(6, lambda _stop, station: 1.0 + 0.3 * station), 6, **known)
     drawn, examined = model.hole.trajectory, model.hole.examined

@@ -92,7 +92,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Beating]:
     ("origin", "grid", "said"),
     [
         ("1,2", "EPSG:25833", "expected NORTHING,EASTING,HEIGHT in m, got '1,2'"),
-        ("nan,0,0", "EPSG:25833", "expected three numbers, got (nan, 0.0, 0.0)"),
+        ("nan,0,0", "EPSG:25833", "expected a coordinate of -1e+08..1e+08 m, got nan"),
         ("1,2,3", "EPSG:0", "expected a grid such as EPSG:25833, got 'EPSG:0'"),
         ("<b>1</b>", "", "<b>1</b>"),
     ],

@@ -34,6 +34,7 @@ from groundstation.service.answers.shapes.adjustment_shapes import (
 )
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.hole.examined_hole import LEVEL, UNEXPLAINED, UNSOLVED, ExaminedHole, std_across
+from groundstation.service.hole.position_sources import UNDONE, take_undone
 from groundstation.service.setup.setup_priors import north_std
 from groundstation.service.setup.toe_costs import TURN_MOST
 from groundstation.survey.adjustment.blunder_cost import BlunderCost
@@ -128,14 +129,12 @@ def budget_of_toe(k: RigModel, examined: ExaminedHole) -> list[NamedShare]:
     """
     drawn = k.hole.trajectory
     shares = [NamedShare(*examined.share_name(one), one.variances) for one in examined.shares]
-    tied = np.diagonal(drawn.tied_covs[-1])  # bends move the collar's direction and the first leg against each other
-    shares = [replace(one, variances=one.variances + tied) if one.source == "path" else one for one in shares]
-    return [
-        NamedShare("north", "", north_at_toe(k)),
-        *shares,
-        NamedShare("depth", "", k.hole.toe_by_depth),
-        NamedShare("legs", "", np.diagonal(drawn.path_covs[-1])),
-    ]
+    shares.append(NamedShare("legs", "", np.diagonal(drawn.path_covs[-1])))
+    tied = [place for place, one in enumerate(shares) if one.source in (*UNDONE, "legs")]
+    left = take_undone(np.array([shares[place].variances for place in tied]), np.diagonal(drawn.tied_covs[-1]))
+    for place, variances in zip(tied, left, strict=True):
+        shares[place] = replace(shares[place], variances=variances)
+    return [NamedShare("north", "", north_at_toe(k)), *shares, NamedShare("depth", "", k.hole.toe_by_depth)]
 
 
 def north_at_toe(k: RigModel) -> Array:
@@ -157,17 +156,18 @@ def toe_parts(budget: Sequence[NamedShare]) -> list[ToePart]:
     by_source: dict[str, list[NamedShare]] = {}
     for one in budget:
         by_source.setdefault(one.source, []).append(one)
-    total = float(sum(one.variances[:LEVEL].sum() for one in budget))
+    total = np.sum([one.variances[:LEVEL] for one in budget], axis=0)
     parts = [part_of(source, same, total) for source, same in by_source.items()]
     return sorted((one for one in parts if one.sigma_cm > LEAST_SHOWN_CM), key=lambda one: -one.percent)
 
 
-def part_of(source: str, shares: Sequence[NamedShare], total: float) -> ToePart:
-    """One source; ``total`` is the variance (m^2) of all to north and east."""
-    variances = np.sum([one.variances for one in shares], axis=0)
+def part_of(source: str, shares: Sequence[NamedShare], total: Array) -> ToePart:
+    """One source; ``total`` (2,) are the variances (m^2) of all to north and east, the larger of which is made up."""
+    variances = np.sum([one.variances[:LEVEL] for one in shares], axis=0)
     worst = max(shares, key=lambda one: std_across(one.variances)).subject if len(shares) > 1 else ""
-    share = float(variances[:LEVEL].sum()) / total if total > 0.0 else 0.0
-    return ToePart(source, say_part(source, worst), CM * std_across(variances), 100.0 * share)
+    share = float(variances.sum() / total.sum()) if total.any() else 0.0
+    sigma = math.sqrt(max(float(variances[np.argmax(total)]), 0.0))
+    return ToePart(source, say_part(source, worst), CM * sigma, 100.0 * share)
 
 
 def least_found(examined: ExaminedHole, one: Reliability) -> LeastFound:

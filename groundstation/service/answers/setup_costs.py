@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from groundstation.service.answers.model import RigModel
 from groundstation.service.hole.examined_hole import ExaminedHole, std_across
+from groundstation.service.hole.position_sources import UNDONE, take_undone
 from groundstation.service.setup.setup_items import SetupItem
 from groundstation.service.setup.setup_priors import setup_priors
 from groundstation.service.setup.toe_costs import toe_costs
@@ -40,9 +41,11 @@ def setup_costs(k: RigModel, items: list[SetupItem], course: Trajectory) -> Mapp
         found: dict[str, Array] = defaultdict(lambda: np.zeros(3))
         found |= {item.name: np.zeros(3) for item in items if item.kind in ADJUSTED_KINDS}  # also of what read nothing
         drawn = k.hole.trajectory
-        found[SetupKind.PATH.value] = np.diagonal(drawn.path_covs[-1] + drawn.tied_covs[-1]).copy()
+        found[SetupKind.PATH.value] = np.diagonal(drawn.path_covs[-1]).copy()
         for name, variances in _shares_by_item(examined, items):
             found[name] += variances
+        left = take_undone(np.array([found[name] for name in UNDONE]), np.diagonal(drawn.tied_covs[-1]))
+        found |= zip(UNDONE, left, strict=True)
         costs |= {name: std_across(variances) for name, variances in found.items()}
     return costs
 

@@ -10,6 +10,8 @@ from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
 from groundstation.survey.well.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
+UNDONE = ("collar", "path")  # sources whose errors undo a part of each other: bends move collar and first legs apart
+LEAST_VARIANCE = 1e-30  # m^2, of what nothing bends
 
 
 def variances_by_source(
@@ -24,10 +26,22 @@ def variances_by_source(
     north_std : rad, of the encoder's zero
     """
     found = _of_directions(drawn, shared, examined, north_std)
-    for name, covs in (("depth", drawn.depth_covs), ("path", drawn.path_covs + drawn.tied_covs)):
+    for name, covs in (("depth", drawn.depth_covs), ("path", drawn.path_covs)):
         found[name] = found.get(name, 0.0) + np.diagonal(covs, axis1=1, axis2=2)
+    names = [name for name in UNDONE if name in found]
+    undone = np.diagonal(drawn.tied_covs, axis1=1, axis2=2)
+    found |= zip(names, take_undone(np.array([found[name] for name in names]), undone), strict=True)
     rest = np.diagonal(drawn.covs, axis1=1, axis2=2) - sum(found.values())
     return {"random": np.maximum(rest, 0.0)} | found
+
+
+def take_undone(parts: Array, undone: Array) -> Array:
+    """Variances (q, ..., 3), m^2, of parts that undo some of each other, without it: ``undone`` (..., 3), 0 or below.
+
+    Each has as much of it off as it is of them all.
+    """
+    left = 1.0 + undone / np.maximum(parts.sum(axis=0), LEAST_VARIANCE)
+    return np.asarray(parts * np.maximum(left, 0.0))
 
 
 def _of_directions(

@@ -59,7 +59,7 @@ class ToePart:
 
     source: Annotated[str, "kind of error, as of `toe`"]
     words: Annotated[str, "the same for people, with the tube that gives most"]
-    sigma_cm: Annotated[float, "standard deviation at the toe that it makes, the larger of north and east"]
+    sigma_cm: Annotated[float, "standard deviation that it makes of `sigma_toe_cm`, whose square theirs add up to"]
     percent: Annotated[float, "of the variance at the toe to north and east"]
 
 

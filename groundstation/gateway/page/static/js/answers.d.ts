@@ -424,7 +424,7 @@ export interface ToePart {
   source: string;
   /** the same for people, with the tube that gives most */
   words: string;
-  /** standard deviation at the toe that it makes, the larger of north and east */
+  /** standard deviation that it makes of `sigma_toe_cm`, whose square theirs add up to */
   sigma_cm: number;
   /** of the variance at the toe to north and east */
   percent: number;
