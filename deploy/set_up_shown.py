@@ -9,6 +9,7 @@ is there yet. Kernels that fail to compile are left to the rig, which says why.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -39,6 +40,10 @@ class Kernels:
     def has_ended(self) -> bool:
         """Whether there is nothing more to wait for."""
         return self._process.poll() is not None
+
+    def wait(self, seconds: float) -> None:
+        """Return when it has ended; ``subprocess.TimeoutExpired`` where it has not by then."""
+        self._process.wait(seconds)
 
     def stop(self) -> None:
         """End it, where it runs."""
@@ -99,7 +104,8 @@ def set_up(venv: Path, command: list[str], bar: Bar) -> int:
                 show_stage(bar, kernels, installs=installing.poll() is None)
                 if installing.poll():
                     break
-                time.sleep(EVERY)
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    (kernels if installing.poll() is not None and kernels is not None else installing).wait(EVERY)
         finally:
             bar.end()
             for process in (installing, *((kernels,) if kernels is not None else ())):

@@ -20,6 +20,8 @@ from typing import Any
 from forked_commands import Command, warm_forker
 from forked_commands import run as run_forked
 
+from telemetry.media.zenoh_bus import ZenohBus
+
 REPOSITORY = Path(__file__).parents[2]
 PATIENCE = 120.0
 FIRST_PORT, SHARE = 12_000, 1_000
@@ -133,3 +135,16 @@ def started(*words: str, own_session: bool = False) -> Command:
 def run(*words: str, cwd: Path = REPOSITORY) -> subprocess.CompletedProcess[str]:
     """A command to its end."""
     return run_forked(*words, timeout=PATIENCE, cwd=cwd, source=warm_forker())
+
+
+def first_answer(bus: ZenohBus, rig: str, path: str, fits: Callable[[Any], bool]) -> Any:
+    """The first answer of a ground station that fits."""
+    deadline = time.monotonic() + PATIENCE
+    idle: queue.SimpleQueue[None] = queue.SimpleQueue()
+    while time.monotonic() < deadline:
+        for reply in bus.get(f"borechain/{rig}/ground/{path}", 10.0):
+            if reply.error is None and fits(answer := json.loads(reply.payload)):
+                return answer
+        with contextlib.suppress(queue.Empty):  # asking without a pause keeps the others from a core
+            idle.get(timeout=0.05)
+    raise TimeoutError(path)

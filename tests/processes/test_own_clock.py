@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 from forked_commands import Command as Forked
-from rigs import PATIENCE, free_endpoint, run, started
+from rigs import PATIENCE, first_answer, free_endpoint, run, started
 
 from borechain.pki.access import read_access
 from borechain.pki.rig_keys import add_tube, init_rig
@@ -241,19 +241,6 @@ def test_a_sealed_string_on_can_is_heard_over_tls(tmp_path: Path) -> None:
         string.end()
 
 
-def until(bus: ZenohBus, path: str, fits: Callable[[Any], bool]) -> Any:
-    """The first answer of the ground station that fits."""
-    deadline = time.monotonic() + PATIENCE
-    idle: queue.SimpleQueue[None] = queue.SimpleQueue()
-    while time.monotonic() < deadline:
-        for reply in bus.get(f"borechain/{RIG}/ground/{path}", 10.0):
-            if reply.error is None and fits(answer := json.loads(reply.payload)):
-                return answer
-        with contextlib.suppress(queue.Empty):  # asking without a pause keeps the others from a core
-            idle.get(timeout=0.05)
-    raise TimeoutError(path)
-
-
 def test_an_order_to_a_silent_tube_holds_up_nobody(string: String, router: tuple[str, ZenohBus]) -> None:
     bus, ordered = router[1], f"borechain/{RIG}/cmd"
     (string.folder / "ground").mkdir()
@@ -263,16 +250,16 @@ def test_an_order_to_a_silent_tube_holds_up_nobody(string: String, router: tuple
     string.start_encoder()
     string.start_node()
     silent = threading.Thread(target=bus.get, args=(f"{ordered}/take_survey?tube=2", PATIENCE))
-    until(bus, "nodes/1", lambda node: True)
+    first_answer(bus, RIG, "nodes/1", lambda node: True)
     silent.start()
-    until(bus, "orders", lambda answer: bool(answer["orders"]))
+    first_answer(bus, RIG, "orders", lambda answer: bool(answer["orders"]))
     (reply,) = bus.get(f"{ordered}/timing?tube=1", PATIENCE)
     assert reply.error is None
     order = json.loads(reply.payload)
     assert (order["tube"], order["state"], order["done"]) == (1, "done", True)
     assert order["values"]["cycles"] > 0
     assert order["values"]["cycle_p99_s"] <= order["values"]["cycle_max_s"]
-    first, second = until(bus, "orders", lambda answer: True)["orders"]
+    first, second = first_answer(bus, RIG, "orders", lambda answer: True)["orders"]
     assert (first["command"], first["tube"], first["state"]) == ("take_survey", 2, "sent")
     assert order == order | second  # the reply says when it was made besides
     string.end()
@@ -287,18 +274,19 @@ def test_the_crew_is_told_of_a_frozen_node_and_of_an_encoder_that_starts_again(
     string.start("ground")
     string.start_encoder()
     string.start_node()
-    until(bus, "nodes/1", lambda node: not node["stale"])
-    until(bus, "status", lambda rig: rig["tubes"] == 1)  # before it is aided its place in the string is unknown
+    first_answer(bus, RIG, "nodes/1", lambda node: not node["stale"])
+    # before it is aided its place in the string is unknown
+    first_answer(bus, RIG, "status", lambda rig: rig["tubes"] == 1)
     string.running["node"].send_signal(signal.SIGSTOP)
-    silent = until(bus, "nodes/1", lambda node: node["age_s"] > frozen)
+    silent = first_answer(bus, RIG, "nodes/1", lambda node: node["age_s"] > frozen)
     assert silent["stale"]
-    until(bus, "alarms", lambda answer: "tube_silent" in codes(answer))
+    first_answer(bus, RIG, "alarms", lambda answer: "tube_silent" in codes(answer))
     string.running["node"].send_signal(signal.SIGCONT)
-    until(bus, "alarms", lambda answer: "tube_silent" not in codes(answer))
+    first_answer(bus, RIG, "alarms", lambda answer: "tube_silent" not in codes(answer))
     string.kill("encoder")
     string.start_encoder()
-    until(bus, "alarms", lambda answer: "epoch" in codes(answer))
-    until(bus, "nodes/1", lambda node: not node["stale"] and node["age_s"] >= 0.0)
+    first_answer(bus, RIG, "alarms", lambda answer: "epoch" in codes(answer))
+    first_answer(bus, RIG, "nodes/1", lambda node: not node["stale"] and node["age_s"] >= 0.0)
     string.end()
 
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
-import queue
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from forked_commands import Command
-from rigs import PATIENCE, free_endpoint, started
+from rigs import PATIENCE, first_answer, free_endpoint, started
 
 from sim.can.can_hub import running_hub
 from sim.world.recording import record_sensors, turning_once
@@ -58,30 +56,17 @@ def bus(tmp_path: Path) -> Iterator[ZenohBus]:
                 process.communicate()
 
 
-def until(bus: ZenohBus, path: str, fits: Callable[[Any], bool]) -> Any:
-    """The first answer of the ground station that fits."""
-    deadline = time.monotonic() + PATIENCE
-    idle: queue.SimpleQueue[None] = queue.SimpleQueue()
-    while time.monotonic() < deadline:
-        for reply in bus.get(f"borechain/{RIG}/ground/{path}", 10.0):
-            if reply.error is None and fits(answer := json.loads(reply.payload)):
-                return answer
-        with contextlib.suppress(queue.Empty):
-            idle.get(timeout=0.2)
-    raise TimeoutError(path)
-
-
 def alarm_of(answer: dict[str, Any]) -> str:
     return next((str(row["detail"]) for row in answer["rig"] if row["code"] == "same_number"), "")
 
 
 def test_which_two_is_told_and_one_order_settles_it_and_one_undoes_that(bus: ZenohBus) -> None:
-    told = alarm_of(until(bus, "alarms", alarm_of))
+    told = alarm_of(first_answer(bus, RIG, "alarms", alarm_of))
     assert "tube 1 from the top, shown as tube 1002, and tube 3 from the top" in told
-    string = until(bus, "string", lambda answer: len(answer["tubes"]) == len(NUMBERS))
+    string = first_answer(bus, RIG, "string", lambda answer: len(answer["tubes"]) == len(NUMBERS))
     assert [row["tube"] for row in string["tubes"]] == [1002, 1, 2]
     for order, settled in (("same_number?tube=2;which=upper", True), ("setup?action=undo", False)):
         (reply,) = bus.get(f"borechain/{RIG}/cmd/{order}", PATIENCE)
         assert reply.error is None
         assert json.loads(reply.payload)["done"] is True
-        until(bus, "alarms", lambda answer, settled=settled: (alarm_of(answer) == "") is settled)
+        first_answer(bus, RIG, "alarms", lambda answer, settled=settled: (alarm_of(answer) == "") is settled)
