@@ -285,9 +285,9 @@ def test_the_lowest_numba_allowed_does_what_the_kernels_lean_on(tmp_path: Path) 
         for top in {file.parts[0] for file in distribution.files or ()} - {"..", "__pycache__"}:
             (made.site / top).symlink_to(Path(str(distribution.locate_file(top))))
     options = ("--noconftest", "-c", os.devnull, "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestWarning")
-    tests = ROOT / "tests" / "node" / "test_compiler.py"
+    tests = [str(ROOT / "tests" / "node" / f"test_{name}.py") for name in ("compiler", "whole_compilation")]
     program = f"import sys; sys.path.insert(0, {str(ROOT)!r}); import numba, pytest; print(numba.__version__); "
-    program += f"sys.exit(pytest.main({[*options, str(tests)]!r}))"
+    program += f"sys.exit(pytest.main({[*options, *tests]!r}))"
     done = made.run("-c", program, program=())
     assert (done.returncode, done.stdout.splitlines()[0]) == (0, lowest["numba"]), done.stdout
 

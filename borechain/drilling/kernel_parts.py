@@ -1,7 +1,8 @@
 """Parts of what a rig compiles, each by a process of its own: ``python -m borechain.drilling.kernel_parts PART``.
 
 A line goes to its output for every function that was compiled. What is there already is loaded, so that a part takes a
-second where nothing is lacking.
+second where nothing is lacking. Only what a rig calls is kept: a kernel inside another one is compiled anew by who
+calls it alone.
 """
 
 from __future__ import annotations
@@ -10,6 +11,9 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Final
 
+import numpy as np
+
+from borechain.drilling.whole_compilation import compiled_whole
 from node.kernels.arithmetic.compiler import leave_blas_out, telling_compiled
 
 
@@ -26,6 +30,14 @@ def compile_surveys() -> None:
 
     warm_end()
     warm_encoder()
+    warm_surveys()
+    from node.kernels.arithmetic.angles import from_binary
+
+    from_binary(np.uint32(0))  # of a report
+
+
+def warm_surveys() -> None:
+    """What the ground station makes of surveys."""
     from groundstation.survey.adjustment.warm_adjustment import warm_adjustment
     from groundstation.survey.path.kernels import curvature_filter, frame_along, mixture_chances
     from groundstation.survey.well.kernels import position_errors
@@ -33,6 +45,9 @@ def compile_surveys() -> None:
     for kernels in (position_errors, frame_along, curvature_filter, mixture_chances):
         kernels.warm_up()
     warm_adjustment()
+    from groundstation.survey.path.developed_directions import develop_directions
+
+    develop_directions(np.tile([0.0, 0.0, 1.0], (2, 1)), np.zeros((2, 3, 3)))
 
 
 def compile_integers() -> None:
@@ -59,5 +74,5 @@ def say_one() -> None:
 
 if __name__ == "__main__":
     leave_blas_out()
-    with telling_compiled(began=lambda: None, ended=say_one):
+    with compiled_whole(), telling_compiled(began=lambda: None, ended=say_one):
         PARTS[sys.argv[1]]()

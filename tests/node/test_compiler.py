@@ -163,4 +163,5 @@ def test_no_other_file_of_ours_leans_on_private_modules() -> None:
     folders = ("benchmarks", "borechain", "groundstation", "node", "sim", "telemetry")
     files = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
     found = {str(path.relative_to(ROOT)) for path in files if PRIVATE.search(path.read_text())}
-    assert found == {"node/kernels/arithmetic/compiler.py"}
+    only_ahead = "borechain/drilling/whole_compilation.py"  # in processes that compile and end
+    assert found == {"node/kernels/arithmetic/compiler.py", only_ahead}
