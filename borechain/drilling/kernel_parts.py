@@ -47,7 +47,8 @@ def warm_surveys() -> None:
     warm_adjustment()
     from groundstation.survey.path.developed_directions import develop_directions
 
-    develop_directions(np.tile([0.0, 0.0, 1.0], (2, 1)), np.zeros((2, 3, 3)))
+    part = np.tile([0.0, 0.0, 1.0, 0.0], (2, 1))[:, :3]  # of a wider table, as those of stations are
+    develop_directions(part, np.zeros((2, 4, 4))[:, :3, :3])
 
 
 def compile_integers() -> None:
