@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 from telemetry.media.can_identifier import SOURCE_SHIFT
 from telemetry.presentation.can_c_fields import WORD_BITS, CField, fields_in_c
 from telemetry.presentation.can_dbc import identifier_of
-from telemetry.presentation.can_forms import Form
+from telemetry.presentation.can_forms import FD_PART, Form
 from telemetry.presentation.can_messages import NATIVE, NativeMessage
 
 NATIVE_HEADER, NATIVE_CODE = "borechain_native.h", "borechain_native.c"
@@ -87,7 +87,8 @@ def write_native_codec() -> NativeCodec:
     digest = hashlib.sha256("\0".join((declared, HELPERS, functions)).encode()).hexdigest()[:16]
     names = [name for message in messages for name in message.entries]
     renamed = "\n".join(f"#define {name} {name}_{digest}" for name in names)
-    return NativeCodec(header_text(declared, renamed, digest), code_text(functions), digest)
+    most = max(len(native.classic.layouts) for native in NATIVE.values())
+    return NativeCodec(header_text(declared, renamed, most, digest), code_text(functions), digest)
 
 
 class MessageInC:
@@ -264,7 +265,7 @@ def snake_case(name: str) -> str:
     return re.sub(r"(?<=.)(?=[A-Z])", "_", name).lower()
 
 
-def header_text(declared: str, renamed: str, digest: str) -> str:
+def header_text(declared: str, renamed: str, most_parts: int, digest: str) -> str:
     """Text of the header."""
     return f"""\
 /* Cyclic messages as signals on CAN. Written by `borechain firmware codec` from the table of the DBC file: do not edit.
@@ -285,6 +286,8 @@ def header_text(declared: str, renamed: str, digest: str) -> str:
 #define {PREFIX.upper()}DIGEST "{digest}"
 #define {PREFIX.upper()}TAKEN 0
 #define {PREFIX.upper()}BAD_LENGTH (-1)
+#define {PREFIX.upper()}MOST_PARTS {most_parts}u /* of a message on classic CAN */
+#define {PREFIX.upper()}FD_PART {FD_PART}u /* of a message that is whole in one frame */
 
 {renamed}
 
