@@ -133,7 +133,7 @@ test-socketcan: $(STAMP)  ## joints on the kernel's own CAN, in a User-Mode Linu
 
 test-firmware: $(STAMP)  ## the step in C on this machine and on emulated chips; installs Debian's compilers and emulators, or says why not
 	$(PYTHON) tests/tools/install_compilers.py
-	$(PYTEST) --timeout 1800 tests/node/chip tests/test_firmware_command.py
+	$(PYTEST) --timeout 1800 tests/node/chip tests/firmware tests/test_firmware_command.py
 
 test-compose: $(STAMP)  ## docker-compose.yml in containers until two tubes are surveyed; says why where that cannot be
 	$(BIN)/python tests/tools/compose.py $(COLD)

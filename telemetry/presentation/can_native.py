@@ -26,7 +26,7 @@ from telemetry.presentation.msgpack_codec import (
     write_payload,
 )
 from telemetry.schema import SPEC_OF, MessageKind
-from telemetry.transport.hop import Header, LinkFrame, pack_frame, parse_frame
+from telemetry.transport.hop import NOT_TOLD, Header, LinkFrame, pack_frame, parse_frame
 from telemetry.unwritten import Content
 
 PRIORITIES = {
@@ -96,9 +96,7 @@ class NativeProfile:
         if frames is None:
             return None
         values = message.unpack(frames, fd=is_fd)
-        epoch = self._epoch.get(source)
-        if epoch is None:
-            raise DecodeError("unknown_sender")
+        epoch = self._epoch.get(source, NOT_TOLD)  # signals are heard before the first header
         newest = self._count.get(source, 0)
         number = newest + (data[0] - newest + HALF & COUNT.largest) - HALF  # urgent frames come before older ones
         self._count[source] = max(newest, number)

@@ -37,6 +37,7 @@ BOOT_SHIFT = 24
 SESSION_SHIFT = 8
 SESSION_MASK = 0xFFFF
 QUALITY_WEIGHT = 1.0 / 32.0
+NOT_TOLD = -1  # instead of the epoch of a sender whose header did not come with its payloads, and has not come before
 ACKNOWLEDGEMENT = "acknowledgement"  # topic of a frame that holds nothing else
 
 
@@ -178,6 +179,7 @@ class HopLink:
     def receive(self, frame: Content, now: float, margin: float = math.inf) -> list[Content]:
         """Return the payloads of a frame that were not delivered before; garbage is counted and gives none.
 
+        Of a sender that has not told its epoch what may be lost is taken, and nothing is acknowledged or counted.
         ``margin`` is what the radio heard it with over its threshold, dB.
         """
         parsed = parse_frame(frame)
@@ -189,6 +191,10 @@ class HopLink:
             self.counters["overheard"] += 1
             return []
         self.margin = margin
+        if epoch == NOT_TOLD:
+            self.last_heard = now
+            self.counters["frames_received"] += 1
+            return [payload for number, payload in entries if number == 0]
         if epoch != self._peer_epoch and self._is_of_before(epoch) and self.is_up(now):
             self.counters["stale_frames"] += 1
             return []

@@ -3,12 +3,10 @@
 import itertools
 import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from recorded_calls import Layout, layout_of
 
 from node.translation.chip_program import BARE
@@ -26,14 +24,6 @@ print(json.dumps([fields_of(FIXED_NODE), fields_of(FIXED_SETTINGS), sizes]))
 HERE = Path(__file__).parent / "chip"
 RISCV_MEMORY = ("flash=0x80000000", "flash_size=0x400000", "ram=0x80400000", "ram_size=0x1000000", "stack_size=0x8000")
 HOST = ("-std=gnu99", "-O1", "-fwrapv")
-
-
-def needs(program: str, package: str) -> pytest.MarkDecorator:
-    """Skip a test where a program is not installed, by the name of Debian's package."""
-    return pytest.mark.skipif(shutil.which(program) is None, reason=f"needs {program}: install Debian's {package}")
-
-
-needs_gcc = needs("gcc", "gcc")
 
 
 def run_program(

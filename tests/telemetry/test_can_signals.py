@@ -26,7 +26,7 @@ from telemetry.presentation.can_native import HEADER_EVERY, NativeProfile, nativ
 from telemetry.presentation.can_signals import Scale
 from telemetry.presentation.msgpack_codec import encode_message, open_payload, values_of_opened
 from telemetry.schema import MessageKind
-from telemetry.transport.hop import HopLink, parse_frame
+from telemetry.transport.hop import HopLink, LinkFrame, parse_frame
 from telemetry.unwritten import Content
 
 DBC = Path(__file__).parents[2] / "docs" / "borechain.dbc"
@@ -324,7 +324,7 @@ def test_a_message_that_no_signal_can_say_takes_the_tunnel() -> None:
     assert carry(upper, lower, ours, theirs, 2.0) == [far]
 
 
-def test_an_end_that_starts_anew_is_understood_after_its_first_frames() -> None:
+def test_an_end_that_starts_anew_understands_from_the_first_frame_on() -> None:
     upper, lower, ours, _ = linked()
     late, into = HopLink(1, 2), NativeProfile()
     late.bundle_limit = 0
@@ -332,8 +332,27 @@ def test_an_end_that_starts_anew_is_understood_after_its_first_frames() -> None:
     for k in range(16):
         upper.send_best_effort(encode_message(replace(AIDING, valid_at=1000.0 + k)), "aiding")
         got += carry(upper, late, ours, into, 2.0 + k * HEADER_EVERY / 8)
-    assert len(got) >= 8
+    assert len(got) == 16
     assert lower.peer == late.peer
+    late.send_reliable(b"survey")
+    assert carry(late, upper, into, ours, 6.0) == [b"survey"]
+
+
+def test_what_must_not_be_lost_waits_for_the_header() -> None:
+    _, lower, ours, _ = linked()
+    aiding = native_parts(encode_message(AIDING), 5, fd=True)
+    assert aiding is not None
+    joined = ours.join(9, *type_and_part(aiding[0]), aiding[0].data)
+    assert isinstance(joined, LinkFrame)
+    numbered = LinkFrame(joined.header, [*joined.entries, (1, b"survey")])
+    late = HopLink(1, 2)
+    assert [bytes(payload) for payload in late.receive(numbered, 2.0)] == [encode_message(rounded_message(AIDING))]
+    assert late.next_wake(2.0) == math.inf  # nothing to acknowledge
+    assert late.peer is None
+    assert late.is_up(2.0)
+    assert lower.peer == (2, 1)
+    lower.receive(joined, 2.0)
+    assert lower.peer == (2, 1)
 
 
 def test_parts_of_two_messages_are_not_put_together() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from borechain.cli.faults import plain_faults
+from borechain.cli.firmware.codec_command import codec
 from borechain.cli.whole_files import make_folder
 from node.process.cluster_options import ClusterRequest
 from node.process.tube_options import SETTING_OPTIONS, TubeRequest
@@ -83,3 +84,6 @@ def provision(request: TubeRequest, room: int, out: Path) -> None:
     for path in made.files:
         click.echo(path)
     click.echo(f"tube {settings.tube}, source {made.digest}, {made.size} bytes")
+
+
+firmware.add_command(codec)
