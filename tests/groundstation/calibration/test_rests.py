@@ -117,6 +117,43 @@ def test_without_a_rate_the_accelerometer_lands_alone() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("wrong", "gate"),
+    [
+        (np.diag([1.0, -1.0, 1.0]), "right-handed: the axes are left-handed"),
+        (np.eye(3)[[1, 0, 2]], "right-handed: the axes are left-handed"),
+        (np.eye(3) / 1.8, "scale: the axes answer with 0.5"),
+        (np.diag([1.0, 1.0, 0.75]), "axes: the axes are not three alike"),
+    ],
+    ids=["mirrored", "exchanged", "scale", "one weak"],
+)
+def test_a_gyroscope_that_is_none_of_this_sensor_is_refused_by_name_and_the_other_lands(
+    tmp_path: Path, wrong: np.ndarray, gate: str
+) -> None:
+    rows = laid_down(seed=2)
+    rows[:, 1:4] = rows[:, 1:4] @ wrong.T
+    outcome = calibrated(tmp_path, rows)
+    assert outcome.gyroscope_document is None
+    assert outcome.result["why_no_gyroscope"].startswith("refused by ")
+    assert gate in outcome.result["why_no_gyroscope"]
+    assert outcome.result["forced"] == []
+    forced = calibrated(tmp_path, rows, force=True)
+    assert forced.gyroscope_document is not None
+    assert any(found.startswith(gate.partition(":")[0]) for found in forced.result["forced"])
+    assert f"forced past {gate.partition(':')[0]}" in from_json(forced.gyroscope_document).provenance.design
+
+
+@pytest.mark.slow
+def test_turns_that_were_not_read_are_refused_by_name(tmp_path: Path) -> None:
+    """A gyroscope that misses a third of every turn about z has no matrix that explains the turns."""
+    rows = laid_down(seed=3)
+    rows[:, 3] = np.clip(rows[:, 3], -0.6, 0.6)
+    refused = calibrated(tmp_path, rows).result["why_no_gyroscope"]
+    assert "turns: " in refused
+    assert "deg rms at turns that were not used, expected up to 1" in refused
+
+
+@pytest.mark.slow
 def test_a_bias_is_no_motion_and_a_steady_turn_is_no_rest(tmp_path: Path) -> None:
     rows = laid_down()
     still = [rest["lines"] for rest in calibrated(tmp_path, rows).result["rests"]]
