@@ -114,6 +114,6 @@ def _walk_of(basis: Array, left: Array, cov: Array) -> _Walk:
     return _Walk(left, own @ basis.T @ inverse, np.diag(own).copy())
 
 
-def widest(factors: Array) -> float:
+def largest_widening(factors: Array) -> float:
     """The largest of the factors, for a certificate: 1 where nothing was seen."""
     return math.floor(100.0 * float(factors.max()) + 0.5) / 100.0

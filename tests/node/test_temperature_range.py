@@ -109,9 +109,10 @@ def test_each_way_out_is_told_once_and_the_bias_is_calm_within(tmp_path: Path) -
     assert node.codes() == ["temperature_beyond", "temperature_within", "temperature_beyond"]
     node.run(5.0, (5.0, 5.0), aided=True)
     assert float(node.process.nodes[0]["config"]["bias_std"][2]) == pytest.approx(calm, rel=1e-6)
-    (first, _, second) = [arguments for code, arguments in node.process.told if code.startswith("temperature")]
+    first, _, second, last = [arguments for code, arguments in node.process.told if code.startswith("temperature")]
     assert (first["low_c"], first["high_c"], second["low_c"]) == (0.0, 40.0, 0.0)
     assert first["temperature_c"] > 40.0 > 0.0 > second["temperature_c"]
+    assert last == {}  # within again
 
 
 def test_a_calibration_keeps_its_range_and_one_of_before_keeps_its_hash(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from groundstation.calibration.calibration_records import read_attitudes, read_t
 from groundstation.calibration.coverage import COVERAGE
 from groundstation.calibration.landing_gates import linear_gates, pass_gates
 from groundstation.calibration.matrix_files import read_matrix
-from groundstation.calibration.residual_walk import walk_widening, widest
+from groundstation.calibration.residual_walk import largest_widening, walk_widening
 from groundstation.calibration.temperature import Array
 from groundstation.calibration.turntable import SETTINGS, as_observations, correct_readings, turntable_alignment
 from groundstation.report.calibration_sheets import AttitudeErrors, linear_sheet
@@ -140,7 +140,7 @@ def widened_calibration(job: LinearCalibration) -> LinearCalibration:
     factors = walk_widening(job.truth, job.fit.residuals)
     by_parameter = np.concatenate([factors[:, 0], factors[:, 1:].ravel()])
     cov = job.fit.cov * np.outer(by_parameter, by_parameter)
-    return replace(job, fit=replace(job.fit, cov=cov), widened=widest(factors))
+    return replace(job, fit=replace(job.fit, cov=cov), widened=largest_widening(factors))
 
 
 def linear_outcome(
