@@ -111,6 +111,7 @@ study: $(STAMP)  ## statistical tests, and every study with many seeds: its tabl
 	nice -n 10 $(BIN)/python tests/planted/run_planted.py --sample 40
 	nice -n 10 $(BIN)/python tests/fuzz/run_fuzz.py --seconds 60
 	$(BIN)/python docs/make_faults.py
+	$(BIN)/python docs/make_real_rests.py
 
 # what the tests leave of the cores, the studies use; they are in no test's way
 studies: kernels  ## the studies; part of `make study`

@@ -67,6 +67,7 @@ class Calibration:
 
     ``matrix`` (3, 3) and ``bias`` (3,) hold at ``reference`` (C); ``matrix_slopes`` (q, 3, 3), ``bias_slopes`` (p, 3)
     are the coefficients of the first and higher powers of (T - reference), none where the temperature is not modelled.
+    ``valid`` (C): the lowest and the highest temperature at which they were measured, where that is known.
     """
 
     sensor: str
@@ -76,6 +77,7 @@ class Calibration:
     bias_slopes: Array
     reference: float
     provenance: Provenance
+    valid: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         _expect(_text(self, "sensor") in SENSORS, "sensor", f"one of {', '.join(SENSORS)}", self.sensor)
@@ -85,6 +87,10 @@ class Calibration:
             _expect(std.shape == value.shape, f"{name}_std", f"the shape {value.shape}", std.shape)
         check_invertible(self.matrix)
         object.__setattr__(self, "reference", float(_freeze(self, "reference", ())))
+        if self.valid is not None:
+            low, high = _freeze(self, "valid", (2,)).tolist()
+            _expect(low < high, "valid", "a temperature and a higher one", f"{low:g} and {high:g} C")
+            object.__setattr__(self, "valid", (low, high))
 
     def canonical(self) -> bytes:
         """Bytes that are equal exactly when the blocks are: sorted keys, no spaces, shortest decimals of each float."""
@@ -124,7 +130,8 @@ def from_json(text: str) -> Calibration:
     _check_keys(whole, "calibration file", {"format", "sha256", "calibration"})
     _expect(whole["format"] == FORMAT, "format", str(FORMAT), whole["format"])
     content = whole["calibration"]
-    _check_keys(content, "calibration", {field.name for field in fields(Calibration)})
+    known = {field.name for field in fields(Calibration)}
+    _check_keys(content, "calibration", known if "valid" in content else known - {"valid"})
     _check_keys(content["provenance"], "provenance", {field.name for field in fields(Provenance)})
     calibration = Calibration(**content | {"provenance": Provenance(**content["provenance"])})
     _expect(whole["sha256"] == calibration.sha256(), "sha256", calibration.sha256(), whole["sha256"])
@@ -247,6 +254,8 @@ def _plain(owner: Calibration | Provenance) -> dict[str, Any]:
     plain: dict[str, Any] = {}
     for field in fields(owner):
         value = getattr(owner, field.name)
+        if value is None:  # a block without it has the hash that it had before there was such a field
+            continue
         if isinstance(value, np.ndarray):
             value = value.tolist()
         plain[field.name] = _plain(value) if isinstance(value, Provenance) else value

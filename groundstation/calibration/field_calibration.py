@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from groundstation.calibration.attitudes import AttitudeFit, fit_attitudes, true_vectors
 from groundstation.calibration.block import Calibration, Provenance
+from groundstation.calibration.landing_gates import LARGEST_RESIDUAL, axes_gates
 from groundstation.calibration.turntable import correct_readings
 from telemetry.errors import CalibrationError
 from telemetry.messages import StaticRecord
@@ -27,8 +28,7 @@ FEWEST = 9  # attitudes; four determine the model, the others judge it
 FEWEST_SAMPLES = 8  # of a record
 LARGEST_FORCE_ERROR = 0.25  # of gravity; beyond it the unit or the sensor is wrong
 LARGEST_CONDITION = 10.0  # of the design; nine tilts up to 90 deg have 1.7 to 3
-LARGEST_RESIDUAL = 0.02  # m/s^2, of one degree of freedom; 0.12 deg of an attitude
-OUTLIER = 4.0  # times that, of one record
+OUTLIER = 4.0  # times the largest residual of a degree of freedom, of one record
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +68,7 @@ def calibrate_accelerometer(rests: Sequence[Rest], gravity: float, day: str) -> 
         )
     residual_rms = math.sqrt(float(np.sum(solved.residuals**2)) / (3 * (len(rests) - 4)))
     _check_residuals(rests, solved, residual_rms)
+    _check_axes(solved.matrix)
     none = np.zeros((0, 3, 3)), np.zeros((0, 3))
     provenance = Provenance(
         input_sha256=_digest(rests, gravity),
@@ -124,6 +125,12 @@ def _check_residuals(rests: Sequence[Rest], solved: AttitudeFit, residual_rms: f
             f"residuals: expected up to {LARGEST_RESIDUAL:g} m/s^2, got {residual_rms:.3g}; the largest, "
             f"{sizes[worst]:.3g}, is at {_name(rests[worst])}: was it this attitude?"
         )
+
+
+def _check_axes(matrix: Array) -> None:
+    failed = [f"{gate.name}: {gate.found}" for gate in axes_gates(matrix) if not gate.holds]
+    if failed:
+        raise CalibrationError("; ".join(failed))
 
 
 def _name(rest: Rest) -> str:

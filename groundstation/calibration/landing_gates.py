@@ -3,7 +3,7 @@
 Least squares takes any numbers. A mirrored axis, a swapped position, a row pasted twice or a sensor that warms up leave
 traces in the record itself: in the sense of the axes, in the residuals' size, order and shape. A gate has a name and a
 finding; a calibration that fails one is refused, or lands with the finding in its certificate where it was forced.
-Source: JCGM 100:2008 (GUM), annex F, for what repeated readings do not show; von Neumann 1941 for their order.
+Source: JCGM 100:2008 (GUM), annex F, for what repeated readings do not show.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from groundstation.calibration.attitudes import AttitudeFit, rank_of
 from groundstation.calibration.coverage import coverage_factor
+from groundstation.calibration.residual_walk import find_walk
 from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
@@ -27,11 +28,7 @@ LARGEST_RESIDUAL: Final = 0.02  # m/s^2 of one degree of freedom, as in the fiel
 LARGEST_SHARE: Final = 2e-3  # of the largest rate, the same of a gyroscope; a printed record has 1e-3
 CLIPPED: Final = 3  # readings at one outermost value
 CHANCE: Final = 0.001  # of an honest record to fail a gate that weighs noise
-CHANCE_OF_ORDER: Final = 0.01  # the same of the order of residuals, where intervals suffer before a walk is plain
 FEWEST_FREE: Final = 4  # degrees of freedom of a residual whose shape is judged
-FEWEST_FOR_ORDER: Final = 8  # the same where it is their order: of fewer, chance and a walk look alike
-DRAWS: Final = 4000  # of noise, for the order of residuals
-SEED: Final = 3
 HALVES: Final = 12  # readings from which each half can be judged by the other
 WORST_RATIO: Final = 4.0  # of what one half leaves in the other, in the noise of a reading
 LARGEST_SIZE: Final = 3e-3  # relative, rms of |G| or |H| of an MWD tool over its record
@@ -85,7 +82,6 @@ def linear_gates(
     jig : rad, standard deviation of the attitudes where it is stated; it explains as much of a residual, and neither
         its order nor its shape is then that of the sensor
     """
-    sizes = np.linalg.svd(fit.matrix / nominal, compute_uv=False)
     degrees = max(len(truth) - 4, 1)
     noise = float(np.sqrt(np.sum(fit.residuals**2) / (3 * degrees)))
     largest = LARGEST_RESIDUAL / reading_si
@@ -95,7 +91,29 @@ def linear_gates(
     worst = int(np.argmax(np.linalg.norm(fit.residuals, axis=1)))
     judged = [] if jig > 0.0 else [_order(truth, fit), _shape(truth, fit), _halves(truth, readings, noise)]
     return [
-        _handed(fit.matrix),
+        *axes_gates(fit.matrix / nominal),
+        Gate(
+            "residual",
+            noise <= largest,
+            f"{noise:.3g} of one degree of freedom, expected up to {largest:.3g}; the largest is at {names[worst]}: "
+            "was it this attitude?",
+        ),
+        _twice(truth, readings, names),
+        range_gate(readings),
+        _better(truth, readings, fit, nominal),
+        *judged,
+    ]
+
+
+def axes_gates(matrix: Array) -> list[Gate]:
+    """Gates of a matrix (3, 3) of readings by truth, without a unit: sense, size and evenness of its axes."""
+    sizes = np.linalg.svd(matrix, compute_uv=False)
+    return [
+        Gate(
+            "right-handed",
+            bool(np.linalg.det(matrix) > 0.0),
+            "the axes are left-handed: one is mirrored, or two are exchanged",
+        ),
         Gate(
             "scale",
             bool(SCALES[0] <= sizes[-1] and sizes[0] <= SCALES[1]),
@@ -108,16 +126,6 @@ def linear_gates(
             f"the axes are not three alike at right angles: largest over smallest answer {sizes[0] / sizes[-1]:.3g}, "
             f"expected up to {UNEQUAL}",
         ),
-        Gate(
-            "residual",
-            noise <= largest,
-            f"{noise:.3g} of one degree of freedom, expected up to {largest:.3g}; the largest is at {names[worst]}: "
-            "was it this attitude?",
-        ),
-        _twice(truth, readings, names),
-        _clipped(readings),
-        _better(truth, readings, fit, nominal),
-        *judged,
     ]
 
 
@@ -147,6 +155,13 @@ def triad_gates(size_rms: float, angle_rms: float, unit: str) -> list[Gate]:
     ]
 
 
+def range_gate(readings: Array) -> Gate:
+    """Whether readings (n, 3) keep off the outermost value: three or more there are a sensor at its range."""
+    sizes = np.abs(readings)
+    at = int(np.sum(sizes == sizes.max()))
+    return Gate("range", at < CLIPPED, f"{at} readings stand at +-{sizes.max():.6g}: the sensor was at its range")
+
+
 def rows_twice(rows: Array) -> list[tuple[int, int]]:
     """Pairs of equal rows of (n, k), each with the first of its kind."""
     first: dict[bytes, int] = {}
@@ -159,21 +174,10 @@ def rows_twice(rows: Array) -> list[tuple[int, int]]:
     return pairs
 
 
-def _handed(matrix: Array) -> Gate:
-    text = "the axes are left-handed: one is mirrored, or two are exchanged"
-    return Gate("right-handed", bool(np.linalg.det(matrix) > 0.0), text)
-
-
 def _twice(truth: Array, readings: Array, names: Sequence[str]) -> Gate:
     pairs = rows_twice(np.hstack([truth, readings]))
     text = f"{len(pairs)} readings stand twice, as {names[pairs[0][0]]} and {names[pairs[0][1]]}" if pairs else ""
     return Gate("duplicates", not pairs, text)
-
-
-def _clipped(readings: Array) -> Gate:
-    sizes = np.abs(readings)
-    at = int(np.sum(sizes == sizes.max()))
-    return Gate("range", at < CLIPPED, f"{at} readings stand at +-{sizes.max():.6g}: the sensor was at its range")
 
 
 def _better(truth: Array, readings: Array, fit: AttitudeFit, nominal: float) -> Gate:
@@ -185,23 +189,8 @@ def _better(truth: Array, readings: Array, fit: AttitudeFit, nominal: float) -> 
 
 def _order(truth: Array, fit: AttitudeFit) -> Gate:
     """Whether residuals follow on each other in the order of the record: a bias that walks, a sensor that warms up."""
-    n = len(truth)
-    if n - 4 < FEWEST_FOR_ORDER:
-        return Gate("drift", holds=True)
-    basis = np.column_stack([np.ones(n), truth])
-    left = np.eye(n) - basis @ np.linalg.pinv(basis)
-    walked = np.minimum.outer(np.arange(n), np.arange(n)).astype(np.float64)  # covariance of a walk from row to row
-
-    def share(residuals: Array) -> Array:
-        """Part of residuals (..., 3, n) that goes as a walk does, summed over the axes."""
-        squares = np.maximum(np.sum(residuals**2, axis=-1), 1e-300)
-        return np.asarray(np.sum(np.einsum("...i,ij,...j->...", residuals, walked, residuals) / squares, axis=-1))
-
-    drawn = np.random.default_rng(SEED).standard_normal((DRAWS, 3, n)) @ left
-    limit = float(np.quantile(share(drawn), 1.0 - CHANCE_OF_ORDER))
-    found = float(share(fit.residuals.T))
     text = "residuals follow on each other in the order of the record: the bias drifted, or the sensor warmed up"
-    return Gate("drift", found <= limit, text)
+    return Gate("drift", not find_walk(truth, fit.residuals), text)
 
 
 def _shape(truth: Array, fit: AttitudeFit) -> Gate:

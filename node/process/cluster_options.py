@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -51,6 +52,7 @@ class ClusterRequest:
             self.noises or (1.0,) * count,
             own_corrections("gyroscope", self.gyroscopes, count),
             own_corrections("accelerometer", self.accelerometers, count),
+            common_ranges(self.gyroscopes, self.accelerometers, count),
             strict=True,
         )
         return tuple(ImuSettings(*row) for row in rows)
@@ -69,3 +71,16 @@ def own_corrections(sensor: str, files: tuple[Path, ...], count: int) -> list[Se
             raise CalibrationError(f"{path}: sensor: expected {sensor}, got {calibration.sensor}")
         corrections.append(sensor_parameters(calibration))
     return corrections or [SensorParameters()] * count
+
+
+def common_ranges(
+    gyroscopes: tuple[Path, ...], accelerometers: tuple[Path, ...], count: int
+) -> list[tuple[float, float]]:
+    """Temperatures (C) at which the corrections of each of ``count`` IMUs were measured; all where no file says."""
+    from telemetry.calibration import read_calibration
+
+    ranges = [(-math.inf, math.inf)] * count
+    for files in filter(None, (gyroscopes, accelerometers)):
+        found = [read_calibration(path).valid or (-math.inf, math.inf) for path in files]
+        ranges = [(max(a, c), min(b, d)) for (a, b), (c, d) in zip(ranges, found, strict=True)]
+    return ranges

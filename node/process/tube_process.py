@@ -17,10 +17,11 @@ from node.firmware.silent_tubes import aiding_across_silent
 from node.firmware.tube import Tube
 from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import Array
-from node.kernels.filter.resets import forget_bias, lose_tilt
+from node.kernels.filter.resets import doubt_bias, forget_bias, lose_tilt
 from node.kernels.record.filter_record import Scheme, default_config
 from node.kernels.record.node_record import new_node
 from node.kernels.record.sensor_record import new_mount
+from node.process.bias_search import BiasSearch
 from node.process.block_store import BlockStore
 from node.process.block_updater import BlockUpdater, load_parameters
 from node.process.command_handlers import CommandHandlers
@@ -29,6 +30,7 @@ from node.process.drivers.source import ImuSource, SafeImu
 from node.process.reading import reading_from, reading_of
 from node.process.saver import Saver
 from node.process.survey_log import SurveyLog
+from node.process.temperature_range import TemperatureRange
 from node.process.temperature_watch import TemperatureWatch
 from telemetry.application.endpoint import REPORT_EVERY, Endpoint
 from telemetry.application.seal_watch import SealWatch
@@ -149,6 +151,10 @@ class TubeProcess(Process):
             parameters=parameters,
         )
         self._warmth = TemperatureWatch(self._send_event, settings.imus, lambda: self.tube.parameters)
+        self._range = TemperatureRange(self._send_event, settings.imus)
+        if self._range.watched:
+            doubt_bias(self.state[0], 0, 0.0)  # compiled before the first cycle
+        self._search = BiasSearch(self._send_event)
         self._commands = CommandHandlers(self.tube, timing, self._resend)
         self._now = 0.0
         self._announced = False
@@ -192,12 +198,14 @@ class TubeProcess(Process):
             first, *others = [reading_from(sample, start, now) for sample in samples]
             reading = replace(first, others=tuple(others))
         reading = self._warmth.look(reading)
+        self._range.look(reading, self.state[0], self.nodes[0]["config"])
         self._lap(CycleStage.READ)
         context = self._context(now)
         if context.synchronised:
             self._announce(context.rig_now, now)
             self._tell_of_silent_tubes()
         said = self.tube.on_cycle(reading, context)
+        self._search.look(self.state[0], self.config[0], now, lost=not math.isfinite(reading.rate[2]))
         self._lap(CycleStage.FILTER)
         for message in said:
             if isinstance(message, Event) and message.code == "clock_jumped":

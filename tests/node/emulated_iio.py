@@ -20,7 +20,7 @@ class EmulatedDevice:
         self.folder = self.sysfs / "iio:device0"
         elements = self.folder / "scan_elements"
         for path in (elements, self.folder / "buffer", self.devices):
-            path.mkdir(parents=True)
+            path.mkdir(parents=True, exist_ok=True)
         self.attributes = {
             "name": name,
             "sampling_frequency": f"{rate:g}",

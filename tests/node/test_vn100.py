@@ -6,12 +6,12 @@ import contextlib
 import functools
 import math
 import os
-import pty
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from emulated_vn100 import Line, line_of
 
 from node.errors import SensorError
 from node.process.drivers.choice import imu_source
@@ -22,29 +22,6 @@ from telemetry.messages import Severity
 from telemetry.records.record_reading import RecordReading
 
 PERIOD = 0.53
-
-
-def line_of(rate: np.ndarray, force: np.ndarray, word: str = "VNIMU") -> bytes:
-    """A line as the manual prints it: signed numbers, exclusive or of the bytes as two hex digits."""
-    numbers = [0.21, -0.1, 0.45, *force, *rate, 31.5, 101.325]
-    body = f"{word}," + ",".join(f"{v:+010.6f}" for v in numbers)
-    return f"${body}*{functools.reduce(lambda a, b: a ^ b, body.encode()):02X}\r\n".encode()
-
-
-class Line:
-    """Both ends of a serial line."""
-
-    def __init__(self) -> None:
-        self.end, other = pty.openpty()
-        self.path = Path(os.ttyname(other))
-        self._other = other
-
-    def send(self, data: bytes) -> None:
-        os.write(self.end, data)
-
-    def cut(self) -> None:
-        os.close(self._other)
-        os.close(self.end)
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ from groundstation.calibration.calibration_records import read_attitudes, read_t
 from groundstation.calibration.coverage import COVERAGE
 from groundstation.calibration.landing_gates import linear_gates, pass_gates
 from groundstation.calibration.matrix_files import read_matrix
+from groundstation.calibration.residual_walk import largest_widening, walk_widening
 from groundstation.calibration.temperature import Array
 from groundstation.calibration.turntable import SETTINGS, as_observations, correct_readings, turntable_alignment
 from groundstation.report.calibration_sheets import AttitudeErrors, linear_sheet
@@ -47,6 +48,7 @@ class LinearCalibration:
     design: str
     record_sha256: str
     forced: tuple[str, ...] = ()  # what its gates found, and was overruled
+    widened: float = 1.0  # its intervals at most, for what a walk of the bias may have moved unseen
 
 
 def answer_turntable(request: TurntableRequest, day: str) -> CalibrationOutcome:
@@ -128,7 +130,17 @@ def judged_calibration(job: LinearCalibration, request: TurntableRequest | Attit
     with naming_file(request.file):
         gates = linear_gates(job.truth, job.readings, job.names, job.fit, nominal, job.reading_si, job.sensor, jig)
         forced = pass_gates(gates, force=request.force)
+    if jig == 0.0 and job.fit.yaw_std == 0.0:
+        job = widened_calibration(job)
     return replace(job, forced=forced, design=job.design + "".join(f"; forced past {found}" for found in forced))
+
+
+def widened_calibration(job: LinearCalibration) -> LinearCalibration:
+    """The calibration with the standard errors that the order of its residuals allows."""
+    factors = walk_widening(job.truth, job.fit.residuals)
+    by_parameter = np.concatenate([factors[:, 0], factors[:, 1:].ravel()])
+    cov = job.fit.cov * np.outer(by_parameter, by_parameter)
+    return replace(job, fit=replace(job.fit, cov=cov), widened=largest_widening(factors))
 
 
 def linear_outcome(
@@ -141,6 +153,8 @@ def linear_outcome(
     factor = fit.coverage_factor() if fit.combined is None else None
     if "yaw_deg" in extra:
         facts.append(("Yaw of the rig", f"{extra['yaw_deg']:.4f} deg, standard error {extra['yaw_std_deg']:.4f} deg"))
+    if job.widened > 1.0:
+        facts.append(("Intervals", f"up to {job.widened:g} times wider, for the order of the residuals"))
     facts.extend(("Forced past", found) for found in job.forced)
     sheet = linear_sheet(f"Calibration of {job.sensor}", fit, at, job.matrix_unit, facts)
     result = {
@@ -157,6 +171,7 @@ def linear_outcome(
             "matrix": fit.matrix_expanded().tolist(),
             "bias": fit.bias_expanded().tolist(),
         },
+        "widened": job.widened,
         "residual_rms": fit.residual_rms(),
         "attitudes": [
             {"name": name, "residual": residual, "lever": lever}

@@ -11,7 +11,7 @@ import numpy as np
 
 from groundstation.calibration.block import Array, Calibration, Provenance, to_json
 from groundstation.calibration.gravity_sphere import GravityFit, fit_gravity_sphere
-from groundstation.calibration.landing_gates import LARGEST_RESIDUAL, Gate, pass_gates
+from groundstation.calibration.landing_gates import LARGEST_RESIDUAL, Gate, axes_gates, pass_gates
 from groundstation.calibration.rest_finder import find_rests
 from groundstation.calibration.turns_between_rests import TurnsFit, fit_turns
 from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome, naming_file
@@ -24,6 +24,7 @@ from telemetry.records.understood_record import understood_line, understood_obje
 NO_SLOPES: Final = (np.zeros((0, 3, 3)), np.zeros((0, 3)))
 USUAL_C: Final = 25.0  # of a block of a record without temperature
 AXES: Final = "xyz"
+LARGEST_TURN_DEG: Final = 1.0  # rms, of gravity turned beside gravity felt; two real MPU-9150 have 0.1
 
 
 def answer_rests(request: RestsRequest, day: str) -> CalibrationOutcome:
@@ -41,7 +42,7 @@ def answer_rests(request: RestsRequest, day: str) -> CalibrationOutcome:
         means = np.array([force[rest].mean(axis=0) for rest in rests]).reshape(-1, 3)
         fit = fit_gravity_sphere(means, request.gravity)
         forced = pass_gates(gravity_gates(fit, means, request.gravity), force=request.force)
-    turns, why_not = turns_of(record, fit, force)
+        turns, why_not, overruled = turns_of(record, fit, force, force_past=request.force)
     warmth = USUAL_C if record.temperature is None else float(record.temperature.mean())
     design = f"{len(rests)} rests at unknown attitudes, |f| = {request.gravity:g} m/s2"
     design += "".join(f"; forced past {found}" for found in forced)
@@ -50,11 +51,12 @@ def answer_rests(request: RestsRequest, day: str) -> CalibrationOutcome:
     other = None
     if turns is not None:
         how = f"{len(turns.residuals)} turns between rests, {rms_deg(turns.left_out):.3g} deg rms at turns not used"
+        how += "".join(f"; forced past {found}" for found in overruled)
         other = block_of("gyroscope", turns, 0.0, how, record.sha256, day, warmth)
     result = rests_json(fit, turns, means, request.gravity) | {
         "why_no_gyroscope": why_not,
         "design": design,
-        "forced": list(forced),
+        "forced": [*forced, *overruled],
         "warnings": [],
         "rests": [
             {"lines": [int(record.lines[rest.start]), int(record.lines[rest.stop - 1])], "residual": residual}
@@ -85,22 +87,32 @@ def gravity_gates(fit: GravityFit, means: Array, gravity: float) -> list[Gate]:
     ]
 
 
-def turns_of(record: ImuRecord, fit: GravityFit, force: Array) -> tuple[TurnsFit | None, str]:
-    """Gyroscope by the turns between rests of both sensors, or the reason why there is none."""
+def turns_of(
+    record: ImuRecord, fit: GravityFit, force: Array, *, force_past: bool
+) -> tuple[TurnsFit | None, str, tuple[str, ...]]:
+    """Gyroscope by the turns between rests of both sensors, or the reason why there is none; findings overruled."""
     if record.rate is None:
-        return None, "the record has no gyroscope"
+        return None, "the record has no gyroscope", ()
     if record.stamps is None:
-        return None, "the record has no times: expected --rate for the gyroscope"
+        return None, "the record has no times: expected --rate for the gyroscope", ()
     rests = find_rests(force, record.rate, record.breaks)
     if any(np.any(record.breaks[a.stop : b.start]) for a, b in itertools.pairwise(rests)):
-        return None, "the record has a gap between two rests"
+        return None, "the record has a gap between two rests", ()
     means = np.array([force[rest].mean(axis=0) for rest in rests]).reshape(-1, 3)
     forces = (means - fit.bias) @ np.linalg.inv(fit.matrix).T
     up = forces / np.linalg.norm(forces, axis=1, keepdims=True)
     try:
-        return fit_turns(record.rate, record.stamps.period, rests, up), ""
+        turns = fit_turns(record.rate, record.stamps.period, rests, up)
+        return turns, "", pass_gates(turn_gates(turns), force=force_past)
     except CalibrationError as error:
-        return None, str(error)
+        return None, str(error), ()
+
+
+def turn_gates(turns: TurnsFit) -> list[Gate]:
+    """Gates of a gyroscope from turns: its axes, in the accelerometer's frame, and turns that were not used."""
+    left = rms_deg(turns.left_out)
+    found = f"{left:.3g} deg rms at turns that were not used, expected up to {LARGEST_TURN_DEG:g}"
+    return [*axes_gates(turns.matrix), Gate("turns", left <= LARGEST_TURN_DEG, found)]
 
 
 def block_of(

@@ -64,7 +64,7 @@ def answer_temperature(request: TemperatureRequest, day: str) -> CalibrationOutc
     held = temperatures_of(record.temperature)
     design = f"{len(held)} temperatures from {low:g} to {high:g} C, bias to power {request.bias_degree}, matrix to "
     design += f"{request.matrix_degree}" + "".join(f"; forced past {found}" for found in forced)
-    block = block_of_fit(fit, si, sensor, provenance_of(record.sha256, day, design, fit, si))
+    block = block_of_fit(fit, si, sensor, provenance_of(record.sha256, day, design, fit, si), (low, high))
     degrees = len(record.truth) - (request.bias_degree + 1) - 3 * (request.matrix_degree + 1)
     factor = coverage_factor(max(degrees, 1))
     result = {
@@ -160,11 +160,20 @@ def provenance_of(sha256: str, day: str, design: str, fit: TemperatureFit, si: f
     )
 
 
-def block_of_fit(fit: TemperatureFit, si: float, sensor: str, provenance: Provenance) -> Calibration:
-    """Parameters in SI as a node takes them."""
+def block_of_fit(
+    fit: TemperatureFit, si: float, sensor: str, provenance: Provenance, valid: tuple[float, float]
+) -> Calibration:
+    """Parameters in SI as a node takes them, ``valid`` (C) where they were measured."""
     model = fit.model
     return Calibration(
-        sensor, model.matrix[0], si * model.bias[0], model.matrix[1:], si * model.bias[1:], model.reference, provenance
+        sensor,
+        model.matrix[0],
+        si * model.bias[0],
+        model.matrix[1:],
+        si * model.bias[1:],
+        model.reference,
+        provenance,
+        valid,
     )
 
 
@@ -179,7 +188,7 @@ def temperature_sheet(fit: TemperatureFit, factor: float, unit: str, result: dic
     low, high = result["valid_c"]
     facts = [
         ("Method", result["design"].partition(";")[0]),
-        ("Valid", f"{low:g} to {high:g} \N{DEGREE SIGN}C; beyond it the polynomials are a guess"),
+        ("Valid", f"{low:g} to {high:g} \N{DEGREE SIGN}C; beyond it a node says so and doubts the bias"),
         ("Residual rms", f"{number_text(fit.residual_rms(), 3)} {unit}"),
         *(("Forced past", found) for found in result["forced"]),
     ]

@@ -56,10 +56,11 @@ def test_predicted_drifts_cover_those_of_ten_made_sensors(tau: float, bias: floa
 
 
 @pytest.mark.slow
-def test_no_axis_of_white_noise_is_without_a_pair() -> None:
+@pytest.mark.parametrize("axes", [90, pytest.param(360, marks=pytest.mark.statistical)])
+def test_no_axis_of_white_noise_is_without_a_pair(axes: int) -> None:
     """What the record does not show has a bound, and the drift predicted with it is not below that of white noise."""
     random = np.random.default_rng(2)
-    for _ in range(360):
+    for _ in range(axes):
         noise = fitted(0.02 * random.standard_normal(6000))
         assert noise.white == pytest.approx(0.02 / math.sqrt(RATE), rel=0.1)
         assert 0.0 < noise.bias_std < 0.5 * noise.white

@@ -44,6 +44,10 @@ small = st.floats(-0.05, 0.05)
 @given(st.lists(small, min_size=9, max_size=9), st.lists(st.floats(-0.5, 0.5), min_size=3, max_size=3))
 def test_any_matrix_and_bias_come_back(off: list[float], offset: list[float]) -> None:
     matrix, bias = np.eye(3) + np.array(off).reshape(3, 3), np.array(offset)
+    if np.linalg.cond(matrix) >= 1.25:
+        with pytest.raises(CalibrationError, match=r"^axes: "):
+            calibrate_accelerometer(rests(matrix, bias), G, DAY)
+        return
     result = calibrate_accelerometer(rests(matrix, bias), G, DAY)
     np.testing.assert_allclose(result.calibration.matrix, matrix, atol=1e-12)
     np.testing.assert_allclose(result.calibration.bias, bias, atol=1e-11)
@@ -112,6 +116,24 @@ def spoil(place: int, **changes: object) -> list[Rest]:
 def test_what_is_no_calibration_is_refused_with_the_reason(wrong: list[Rest], named: str) -> None:
     with pytest.raises(CalibrationError, match=named):
         calibrate_accelerometer(wrong, G, DAY)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "named"),
+    [
+        (np.diag([1.0, -1.0, 1.0]), "^right-handed: the axes are left-handed"),
+        (np.eye(3)[[1, 0, 2]], "^right-handed: the axes are left-handed"),
+        (np.diag([0.9, 1.15, 1.0]), "^axes: the axes are not three alike"),
+    ],
+    ids=["mirrored", "exchanged", "one weak"],
+)
+def test_axes_that_are_no_sensor_s_are_refused_though_nothing_is_left_in_the_residuals(
+    matrix: np.ndarray, named: str
+) -> None:
+    with pytest.raises(CalibrationError, match=named):
+        calibrate_accelerometer(rests(matrix), G, DAY)
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # a mount turned by a right angle
+    assert calibrate_accelerometer(rests(turned), G, DAY).residual_rms < 1e-11
 
 
 def test_an_attitude_that_was_not_the_one_told_is_named() -> None:

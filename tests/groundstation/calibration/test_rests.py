@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -98,15 +99,27 @@ def test_rests_that_were_not_used_are_judged_by_the_other_half_and_by_an_indepen
 
 
 @pytest.mark.slow
-def test_a_real_mpu_9150_keeps_gravity_at_rests_and_turns_that_were_not_used() -> None:
-    outcome = answer_calibration(RestsRequest(REAL, gravity=G, rate=100.0, words=REAL_WORDS), "2026-01-31")
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_real_mpu_9150_keeps_gravity_at_rests_and_turns_that_were_not_used(number: int) -> None:
+    record = REAL.with_name(f"mpu9150-imu{number}-100hz.npy")
+    outcome = answer_calibration(RestsRequest(record, gravity=G, rate=100.0, words=REAL_WORDS), "2026-01-31")
     found = outcome.result
     assert found["before_rms"] > 0.2
     assert found["residual_rms"] <= 0.003
     assert found["left_out_rms"] <= 0.005
-    assert found["gyroscope"]["left_out_rms_deg"] < 0.5 * found["gyroscope"]["uncalibrated_rms_deg"]
+    turned = found["gyroscope"]
+    assert turned["left_out_rms_deg"] < 0.5 * turned["uncalibrated_rms_deg"]
+    assert found["forced"] == []
     assert len(found["rests"]) > 15
     assert "'" not in outcome.document
+    with (Path(__file__).parents[3] / "docs" / "results" / "rests.csv").open(encoding="utf-8") as file:
+        told = list(csv.DictReader(file))[number]
+    printed = [told["after_mps2"], told["not_used_mps2"], told["turns_not_used_deg"]]
+    assert printed == [
+        f"{found['residual_rms']:.5f}",
+        f"{found['left_out_rms']:.5f}",
+        f"{turned['left_out_rms_deg']:.4f}",
+    ]
 
 
 def test_without_a_rate_the_accelerometer_lands_alone() -> None:
@@ -114,6 +127,43 @@ def test_without_a_rate_the_accelerometer_lands_alone() -> None:
     assert outcome.result["residual_rms"] <= 0.003
     assert outcome.gyroscope_document is None
     assert "expected --rate" in outcome.result["why_no_gyroscope"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("wrong", "gate"),
+    [
+        (np.diag([1.0, -1.0, 1.0]), "right-handed: the axes are left-handed"),
+        (np.eye(3)[[1, 0, 2]], "right-handed: the axes are left-handed"),
+        (np.eye(3) / 1.8, "scale: the axes answer with 0.5"),
+        (np.diag([1.0, 1.0, 0.75]), "axes: the axes are not three alike"),
+    ],
+    ids=["mirrored", "exchanged", "scale", "one weak"],
+)
+def test_a_gyroscope_that_is_none_of_this_sensor_is_refused_by_name_and_the_other_lands(
+    tmp_path: Path, wrong: np.ndarray, gate: str
+) -> None:
+    rows = laid_down(seed=2)
+    rows[:, 1:4] = rows[:, 1:4] @ wrong.T
+    outcome = calibrated(tmp_path, rows)
+    assert outcome.gyroscope_document is None
+    assert outcome.result["why_no_gyroscope"].startswith("refused by ")
+    assert gate in outcome.result["why_no_gyroscope"]
+    assert outcome.result["forced"] == []
+    forced = calibrated(tmp_path, rows, force=True)
+    assert forced.gyroscope_document is not None
+    assert any(found.startswith(gate.partition(":")[0]) for found in forced.result["forced"])
+    assert f"forced past {gate.partition(':')[0]}" in from_json(forced.gyroscope_document).provenance.design
+
+
+@pytest.mark.slow
+def test_turns_that_were_not_read_are_refused_by_name(tmp_path: Path) -> None:
+    """A gyroscope that misses a third of every turn about z has no matrix that explains the turns."""
+    rows = laid_down(seed=3)
+    rows[:, 3] = np.clip(rows[:, 3], -0.6, 0.6)
+    refused = calibrated(tmp_path, rows).result["why_no_gyroscope"]
+    assert "turns: " in refused
+    assert "deg rms at turns that were not used, expected up to 1" in refused
 
 
 @pytest.mark.slow
