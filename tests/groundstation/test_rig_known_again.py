@@ -34,7 +34,7 @@ ZERO3 = ((0.0,) * 3,) * 3
 
 
 def record(command: int, begun: float, ended: float, moved: bool = False) -> StaticRecord:
-    return StaticRecord(1, command, command, begun, ended, 60, (0.0,) * 3, ZERO3, (0.0, 0.0, -9.8), ZERO3, 20.0, moved)  # type: ignore[arg-type]
+    return StaticRecord(1, command, command, begun, ended, 60, (0.0,) * 3, ZERO3, (0.0, 0.0, -9.8), ZERO3, 20.0, moved)
 
 
 def answered(number: int, version: int, digest: str) -> Reply:
@@ -86,7 +86,7 @@ def test_a_tube_that_starts_again_gets_its_block_anew(phase: TubePhase) -> None:
     for _ in range(2):
         tube.phase, tube.restarted = phase, False
         for cycles in (1000, 2000, 1999, 5):
-            procedure.on_state(SimpleNamespace(tube=1, cycles=cycles, parameters_hash=b"\x01" * 8))  # type: ignore[arg-type]
+            procedure.on_state(SimpleNamespace(tube=1, cycles=cycles, parameters_hash=b"\x01" * 8))
         assert (tube.phase, tube.restarted) == (TubePhase.CONFIRMED, True)
 
 
@@ -108,7 +108,7 @@ def test_progress_that_the_disk_refused_is_kept_at_the_next_try() -> None:
             kept.append(text)
 
     disk: Any = Disk()
-    control = Recalibration(FieldProcedure(9.81), disk, Path("none"), lambda _: None, lambda: None)  # type: ignore[arg-type, return-value]
+    control = Recalibration(FieldProcedure(9.81), disk, Path("none"), lambda _: None, lambda: None)
     control.procedure.begin([1])
     with pytest.raises(StoreError):
         control.keep_progress()
@@ -133,10 +133,10 @@ def test_a_survey_without_a_depth_is_told_after_exactly_its_time(late: float, is
     waiting = [SimpleNamespace(message=SimpleNamespace(tube=4, sequence=9, epoch=epoch, station_at=100.0))]
     told: list[tuple[str, str, str]] = []
     watch = Watch.__new__(Watch)
-    watch._placement = SimpleNamespace(waiting=waiting)  # type: ignore[assignment]
-    watch._time = SimpleNamespace(epoch=3, rig_now=100.0 + PLACED_WITHIN + late)  # type: ignore[assignment]
-    watch._alarms = SimpleNamespace(hold=lambda *words: told.append(words))  # type: ignore[assignment]
-    watch._hole = SimpleNamespace(turned_back=[])  # type: ignore[assignment]
+    watch._placement = SimpleNamespace(waiting=waiting)
+    watch._time = SimpleNamespace(epoch=3, rig_now=100.0 + PLACED_WITHIN + late)
+    watch._alarms = SimpleNamespace(hold=lambda *words: told.append(words))
+    watch._hole = SimpleNamespace(turned_back=[])
     watch._told_unplaced, watch._told_back = set(), set()
     for _ in range(2):
         watch._look_at_surveys()
@@ -180,8 +180,8 @@ def test_a_survey_that_waits_for_its_depth_waits_once_and_is_placed_once(tmp_pat
     placement, string = rig.ground.model.placement, rig.ground.model.string
     one = SimpleNamespace(message=None, below=0.0, md=None)
     known: list[float | None] = [None, None, 3.0, 3.0]
-    string.depth_of = lambda _message, _below: known.pop(0)  # type: ignore[method-assign, assignment]
-    placement.waiting = [one]  # type: ignore[list-item]
+    string.depth_of = lambda _message, _below: known.pop(0)
+    placement.waiting = [one]
     found = [placement.take_placeable() for _ in range(4)]
     assert [len(taken) for taken in found] == [0, 0, 1, 0]
     assert placement.waiting == []
@@ -196,7 +196,7 @@ def test_a_node_may_be_above_the_collar_by_a_rounding_and_is_then_at_it(
     rig.run(5.0)
     rig.drill(1, 0.3)
     string = rig.ground.model.string
-    string.depths.at = lambda _epoch, _time: 2.0 - above  # type: ignore[method-assign]
+    string.depths.at = lambda _epoch, _time: 2.0 - above
     message: Any = SimpleNamespace(flags=NodeFlag.NONE, epoch=1, station_at=0.0, hops=2)
     found = string.depth_of(message, 2.0)
     assert found == (None if depth is None else pytest.approx(depth))

@@ -92,7 +92,7 @@ def test_an_event_and_a_static_record_are_shown_whole() -> None:
     force_cov = tuple(tuple(10.0 * x for x in row) for row in rate_cov)
     record = StaticRecord(
         3, 41, 17, 100.5, 160.5, 115, (0.1, 0.2, 0.3), rate_cov, (1.0, 2.0, -9.0), force_cov, 21.5, True
-    )  # type: ignore[arg-type]
+    )
     assert values_of(static_record_row(record, 8)) == {
         "seq": 8, "tube": 3, "sequence": 41, "order": 17, "begun_at_s": 100.5, "ended_at_s": 160.5, "samples": 115,
         "rate_rad_s": [0.1, 0.2, 0.3], "rate_cov_rad2_s2": [list(row) for row in rate_cov],
@@ -324,14 +324,14 @@ def test_the_next_stop_is_advised_with_what_no_turn_makes_better() -> None:
         angles=np.array([-1.5, 0.1, 1.5]), toe_stds=np.array([0.05, 0.09, 0.03]), best=1.5,
     )  # fmt: skip
     budget = [share("north", 4.0, 5.0), share("tilt", 90.0, 90.0), share("depth", 1.0, 2.0), share("legs", 3.0, 1.0)]
-    found = next_stop_advice(SimpleNamespace(next_stop=planned), budget)  # type: ignore[arg-type]
+    found = next_stop_advice(SimpleNamespace(next_stop=planned), budget)
     assert found is not None
     stays = 4.0 + 5.0 + 1.0 + 2.0 + 3.0 + 1.0
     values = list(values_of(found).values())
     assert values[:3] == pytest.approx(
         [math.degrees(1.5), math.sqrt((9.0 + stays) / 2.0), math.sqrt((81.0 + stays) / 2.0)]
     )
-    assert next_stop_advice(SimpleNamespace(next_stop=None), budget) is None  # type: ignore[arg-type]
+    assert next_stop_advice(SimpleNamespace(next_stop=None), budget) is None
 
 
 def test_shares_of_one_item_are_those_of_its_kind_and_tube() -> None:

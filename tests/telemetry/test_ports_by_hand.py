@@ -83,11 +83,11 @@ def test_an_end_is_taken_until_its_port_is_closed() -> None:
 def can_port() -> Any:
     """A port without its thread and its controller."""
     port = CanPort.__new__(CanPort)
-    port._exchange = SimpleNamespace(  # type: ignore[assignment]
+    port._exchange = SimpleNamespace(
         on_refused=lambda: None, on_acknowledged=lambda _: None, on_frame=lambda *_: None,
     )  # fmt: skip
     port._lock, port._closed, port._controller = threading.RLock(), False, None
-    port._queue = SimpleNamespace(counters=Counter(), limit=0)  # type: ignore[assignment]
+    port._queue = SimpleNamespace(counters=Counter(), limit=0)
     port._unheard = deque(maxlen=UNHEARD_LIMIT)
     port._pause, port._reopen_at = FIRST_PAUSE, math.inf
     return port

@@ -216,5 +216,5 @@ def test_noise_of_a_gyroscope_has_the_unit_of_its_file_and_its_time_has_seconds(
 def test_what_is_left_out_begins_before_it_ends() -> None:
     for told in ({"begin": 5.0, "end": 5.0}, {"without": ("5..5",)}, {"without": ("6..5",)}, {"without": ("5",)}):
         with pytest.raises(LoggerError):
-            reading_of(**told)  # type: ignore[arg-type]
+            reading_of(**told)
     assert reading_of(begin=5.0, end=5.1, without=("7..7.5",)).without == ((7.0, 7.5),)

@@ -179,7 +179,7 @@ def test_variances_of_a_place_by_their_sources() -> None:
         depth_covs=np.array([np.zeros((3, 3)), np.diag([4e-4, 5e-4, 6e-4])]),
     )
     examined: Any = SimpleNamespace(position_variances={"bias": np.zeros((2, 3))})
-    found = _of_directions(drawn, None, examined, 0.01)  # type: ignore[arg-type]
+    found = _of_directions(drawn, None, examined, 0.01)
     assert found["north"][1] == pytest.approx([(0.01 * 4.0) ** 2 + 1e-5, (0.01 * 3.0) ** 2 + 2e-5, 0.0])
     assert found["depth"][1] == pytest.approx([1e-4, 2e-4, 3e-4])
     assert depth_variance_at_toe(drawn) == pytest.approx([5e-4, 7e-4, 9e-4])
@@ -202,7 +202,7 @@ def test_a_depth_that_was_read_more_often_is_better_known_and_what_was_told_anew
     setup: Any = SimpleNamespace(version=1, lengths={})
     stops: Any = SimpleNamespace(depth_places=dict.fromkeys(range(9), ()))
     config: Any = SimpleNamespace(tube_length=2.0)
-    depths = HoleDepths(config, setup, None, stops)  # type: ignore[arg-type]
+    depths = HoleDepths(config, setup, None, stops)
     station: Any = SimpleNamespace(md=4.0, revised=0, stops=SimpleNamespace(rows=[0, 1, 2, 3]))
     found = [depths.of_stations([station], learns=False)[4.0] for _ in range(2)]
     assert [dataclasses.astuple(one) for one in found] == [(1, pytest.approx(0.06**2 / 4.0))] * 2
