@@ -16,8 +16,8 @@ from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.node_record import TEMPERATURE
 from sim.rig.link_channel import PortStream
 from sim.rig.radio_channel import RadioChannel, failed_attempts
-from sim.world.disturbance import accelerometer, converter, gyroscope, warm_up
 from sim.world.depth_meter import DepthMeter
+from sim.world.disturbance import accelerometer, converter, gyroscope, warm_up
 from sim.world.marks import Marks
 from sim.world.rack import Rack
 from sim.world.random_streams import RandomStream, random_stream
