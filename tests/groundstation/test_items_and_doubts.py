@@ -117,7 +117,8 @@ def test_what_is_shown_of_a_setup_is_another_once_any_part_of_it_is(tmp_path: Pa
 
 def known(bit: float | None = 10.0, age: float = 0.0, silent: tuple[int, ...] = (), **more: Any) -> Any:
     return SimpleNamespace(
-        **{"time": SimpleNamespace(is_known=True), "bit": bit, "depth_age": age, "silent": list(silent), "tubes": [2, 1]}
+        **{"time": SimpleNamespace(is_known=True), "bit": bit, "depth_age": age, "silent": list(silent),
+           "tubes": [2, 1]}
         | more
     )  # fmt: skip
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,9 +19,11 @@ from node.firmware.tube_settings import MakeUpAngle, TubeSettings, settings_reco
 from node.kernels.arithmetic.angles import to_binary
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import new_node
+from node.process.survey_log import PLACES, SurveyLog
 from telemetry.messages import NodeFlag, NodeMode
 from telemetry.parameters import ParameterBlock, SensorParameters
 from telemetry.records.noise_file import GyroNoise
+from telemetry.runtime.disk import MACHINE
 
 DEG = math.pi / 180.0
 ANY_YAW = math.pi / math.sqrt(3.0)  # standard deviation of a yaw that may be any, rad
@@ -173,3 +176,30 @@ def test_a_gyroscope_that_was_calibrated_nowhere_has_the_scale_of_its_data_sheet
     ):
         config = sensor_config(TubeSettings(3, imus=imus), block)[0]
         assert float(config["scale_std"]) == pytest.approx(BARE_SCALE_STD if is_bare else 1e-3)
+
+
+class FullNow:
+    """The machine's disk, which refuses what is written while it is full."""
+
+    full = False
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(MACHINE, name)
+
+    def write(self, path: Path, data: bytes, offset: int = 0) -> None:
+        if self.full:
+            raise OSError(28, "No space left on device")
+        MACHINE.write(path, data, offset)
+
+
+def test_a_survey_that_the_disk_refused_takes_no_place_of_those_that_are_kept(tmp_path: Path) -> None:
+    disk: Any = FullNow()
+    log = SurveyLog(tmp_path, disk)
+    for number in range(1, PLACES + 3):
+        disk.full = number in (7, 40)
+        log.append_payload(number, bytes([number % 256]))
+    kept = [number for number in range(1, PLACES + 3) if number not in (7, 40)]
+    assert log.refused == 2
+    assert [number for number, _ in log.payloads(0, 1000)] == kept
+    log.append_payload(900, b"x")  # the oldest makes way
+    assert [number for number, _ in log.payloads(0, 1000)] == [*kept[1:], 900]
