@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from test_resolved_stops import stops_of
 
 from groundstation.service.alarms.verdict import Deadline, HoleVerdict
 from groundstation.service.alarms.verdict_words import Word
@@ -22,6 +23,7 @@ from groundstation.service.answers.adjustment_views import (
 )
 from groundstation.service.answers.column_views import answer_column, column_deviation, cone_row, foreseen_end
 from groundstation.service.answers.hole_views import answer_uncertainty, direction_value, position_values
+from groundstation.service.answers.measurement_views import _selected, measurement_rows
 from groundstation.service.answers.recalibration_views import rest_attitude, solution_figures, tube_calibration
 from groundstation.service.answers.setup_views import setup_row
 from groundstation.service.answers.string_views import answer_node, event_row, flag_names, static_record_row
@@ -242,6 +244,42 @@ def test_a_recalibration_is_shown_as_it_stands() -> None:
         "restarted": True, "hash_after_restart": "bb", "hash": "cc", "version": None, "hash_proposed": "",
     }  # fmt: skip
     assert {name: row[name] for name in shown} == shown
+
+
+def test_a_survey_is_shown_with_its_own_variances() -> None:
+    table = stops_of(3, 6, 101.5)
+    table.rows["yaw"], table.rows["yaw_var"], table.rows["systematic_var"] = 0.5, 4e-6, 9e-6
+    table.rows["md"], table.rows["replaces"], table.rows["settle_time"] = 6.25, 4, 33.0
+    (row,) = measurement_rows(table, [0], [2])
+    assert (row.yaw_deg, row.sigma_yaw_deg, row.sigma_systematic_deg) == pytest.approx(
+        [math.degrees(one) for one in (0.5, 2e-3, 3e-3)]
+    )
+    assert (row.station, row.md_m, row.tube, row.sequence, row.replaces) == (2, 6.25, 3, 6, 4)
+    assert (row.station_at_s, row.hops, row.samples, row.settle_s) == (101.5, 3, 32, 33.0)
+    assert (row.quality, row.trust, row.flags) == (["motion", "spread"], "full", [])
+    assert row.inclination_deg == pytest.approx(math.degrees(0.003), rel=1e-3)
+    assert row.forces_mps2 == [[pytest.approx(9.81 * math.sin(0.003)), 0.0, pytest.approx(-9.81 * math.cos(0.003))]]
+
+
+@pytest.mark.parametrize(
+    ("asked", "rows", "stations"),
+    [
+        ({}, [0, 1, 2, 3], [1, 1, 2, 3]),
+        ({"station": "2"}, [2], [2]),
+        ({"tube": "7"}, [1, 3], [1, 3]),
+        ({"since": "0"}, [3, 1, 0, 2], [3, 1, 1, 2]),
+        ({"since": "2"}, [0, 2], [1, 2]),
+        ({"since": "4"}, [], []),
+    ],
+)
+def test_surveys_are_chosen_by_station_by_tube_and_by_those_that_were_seen(
+    asked: dict[str, str], rows: list[int], stations: list[int]
+) -> None:
+    columns = {"number": np.array([3, 2, 4, 1]), "tube": np.array([5, 7, 5, 7])}
+    known = [SimpleNamespace(stops=SimpleNamespace(rows=np.array(own))) for own in ([0, 1], [2], [3])]
+    hole = SimpleNamespace(stations=known, stops=SimpleNamespace(column=columns.__getitem__), newest=4)
+    found, of = _selected(SimpleNamespace(hole=hole), asked)
+    assert (found.tolist(), of.tolist()) == (rows, stations)
 
 
 # the verdict

@@ -32,7 +32,7 @@ GROUND: dict[tuple[str, str], dict[str, Any]] = {
     ("accept_depth", "confirm"): {}, ("accept_joints", "confirm"): {},
     ("alarm", "acknowledge"): {"number": NUMBER}, ("alarm", "unshelve"): {"number": NUMBER},
     ("alarm", "shelve"): {"number": NUMBER, "minutes": ("number", "min", 1.0, 720.0, False, 30.0)},
-    ("recalibrate", "begin"): {"tubes": ("integers", "", 1, 250, False, None)},
+    ("recalibrate", "begin"): {"tubes": ("list of integers", "", 1, 250, False, None)},
     ("recalibrate", "attitude"): {
         "pitch": ("number", "rad", -PI, PI, True, None), "roll": ("number", "rad", -PI, PI, True, None),
         "seconds": RECORD,
