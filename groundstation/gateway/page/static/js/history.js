@@ -28,10 +28,15 @@ export class History {
     const slider = byId("moment");
     slider.max = String(moments.length);
     slider.disabled = moments.length === 0;
-    const place = this.chosen ? moments.findIndex((moment) => moment.moment === this.chosen.moment) : -1;
+    const place = this.placeOfChosen();
     slider.value = String(place < 0 ? moments.length : place);
     if (this.chosen && place < 0) this.choose(moments.length);
     this.draw();
+  }
+
+  /** Where the chosen moment stands among those that were told last; -1 for the present or where it is gone. */
+  placeOfChosen() {
+    return this.chosen ? this.moments.findIndex((moment) => moment.moment === this.chosen.moment) : -1;
   }
 
   async choose(place) {
@@ -67,7 +72,7 @@ export class History {
       shape("text", { x: LEFT - 4, y: y(level) + 4, "text-anchor": "end", class: "quiet" }, String(level)),
     ]);
     parts.push(shape("polyline", { points: used.map((percent, place) => `${x(place)},${y(percent)}`).join(" "), class: "path" }));
-    const place = this.chosen ? this.moments.indexOf(this.chosen) : -1;
+    const place = this.placeOfChosen();
     if (place >= 0) parts.push(shape("circle", { cx: x(place), cy: y(used[place]), r: 5, class: "dot" }));
     const label = `Of the tolerance used after each of ${used.length} stops, percent`;
     byId("course").replaceChildren(shape("svg", { viewBox: `0 0 ${width} ${HEIGHT}`, role: "img", "aria-label": label }, ...parts));
