@@ -334,13 +334,13 @@ class GroundProcess(Process):
             order = self.operator.command(tube, "resend", {"first": first, "last": last}, by=GROUND_STATION)
         except SelectorError:
             return  # the tube is not known yet; the gap stays
-        order.when_answered(lambda: self._on_resent(order))
+        order.when_answered(lambda: self._on_resent(order, first))
 
-    def _on_resent(self, order: SentOrder) -> None:
+    def _on_resent(self, order: SentOrder, first: int) -> None:
         values = order.values
         if order.done and order.tube is not None:
             sent, complete_from = int(str(values.get("sent", 0))), int(str(values.get("complete_from", 0)))
-            self.watch.on_resent(order.tube, sent, complete_from, self._string.time.now)
+            self.watch.on_resent(order.tube, first, sent, complete_from, self._string.time.now)
 
     def _on_reading(self, reading: DepthReading, now: float) -> None:
         refused = self._string.on_depth(reading, now)
