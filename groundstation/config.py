@@ -30,6 +30,17 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 SmallStd = Annotated[float, Field(ge=0.0, le=100.0)]  # m, or m/m
 
 
+def within_range(name: str) -> AfterValidator:
+    """Validator of a quantity of ``RANGES``, which refuses it by its name, its unit and its range."""
+
+    def check(value: float) -> float:
+        if not RANGES[name].low <= value <= RANGES[name].high:
+            raise PydanticCustomError("range", "expected {expected}", {"expected": RANGES[name].expected})
+        return value
+
+    return AfterValidator(check)
+
+
 def known_tolerance(text: str) -> str:
     """The text of a tolerance that can be read."""
     try:
@@ -104,11 +115,19 @@ class GroundConfig(BaseModel):
     steering_deg_per_m: SigmaDeg = Field(0.5, description="the most by which the rig bends a hole back")
     wall: Path | None = Field(None, description="wall file of which this hole is a column")
     hole: str = Field("", description="name of this hole in the wall file")
-    station_tolerance: Positive = Field(0.05, description="m, within which two surveys are at the same station")
-    stale_after: Positive = Field(4.5, description="s without a state of a node")
-    depth_rate: Positive = Field(0.2, description="m/s, the fastest that the bit is moved")
-    depth_gap: Positive = Field(5.0, description="s, between two depths that bracket the time of a survey")
-    survey_after: Positive = Field(60.0, description="s of a stop until every tube in the hole must have surveyed")
+    station_tolerance: Annotated[float, within_range("station_tolerance")] = Field(
+        0.05, description="m, within which two surveys are at the same station"
+    )
+    stale_after: Annotated[float, within_range("stale_after")] = Field(4.5, description="s without a state of a node")
+    depth_rate: Annotated[float, within_range("depth_rate")] = Field(
+        0.2, description="m/s, the fastest that the bit is moved"
+    )
+    depth_gap: Annotated[float, within_range("depth_gap")] = Field(
+        5.0, description="s, between two depths that bracket the time of a survey"
+    )
+    survey_after: Annotated[float, within_range("survey_after")] = Field(
+        60.0, description="s of a stop until every tube in the hole must have surveyed"
+    )
 
     @property
     def calibrations(self) -> Path:

@@ -46,6 +46,11 @@ class GroundRequest:
     weighting: str
     accelerometer_bias_std_deg: float
     mount_std_deg: float
+    station_tolerance_m: float
+    stale_after_s: float
+    depth_rate_mps: float
+    depth_gap_s: float
+    survey_after_s: float
     wall: Path | None
     hole: str
     database: str | None
@@ -78,6 +83,11 @@ class GroundRequest:
             "weighting": self.weighting,
             "accelerometer_bias_std_deg": self.accelerometer_bias_std_deg,
             "mount_std_deg": self.mount_std_deg,
+            "station_tolerance": self.station_tolerance_m,
+            "stale_after": self.stale_after_s,
+            "depth_rate": self.depth_rate_mps,
+            "depth_gap": self.depth_gap_s,
+            "survey_after": self.survey_after_s,
             "wall": self.wall,
             "hole": self.hole,
             "database_url": self.database,
@@ -186,6 +196,41 @@ ground_options = gather_options(
         default=0.05,
         show_default=True,
         help="Standard error of an IMU's mounting about its tube's axis.",
+    ),
+    click.option(
+        "--station-tolerance-m",
+        type=float,
+        default=0.05,
+        show_default=True,
+        help="Two surveys within this depth are at one station.",
+    ),
+    click.option(
+        "--stale-after-s",
+        type=float,
+        default=4.5,
+        show_default=True,
+        help="A tube, or the depth, is silent after so long without a word.",
+    ),
+    click.option(
+        "--depth-rate-mps",
+        type=float,
+        default=0.2,
+        show_default=True,
+        help="The fastest that the bit is moved; a depth beyond it jumped.",
+    ),
+    click.option(
+        "--depth-gap-s",
+        type=float,
+        default=5.0,
+        show_default=True,
+        help="The longest between two depths that place a survey between them.",
+    ),
+    click.option(
+        "--survey-after-s",
+        type=float,
+        default=60.0,
+        show_default=True,
+        help="Of a stop, until every tube in the hole must have surveyed.",
     ),
     click.option(
         "--wall",

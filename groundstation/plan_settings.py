@@ -11,13 +11,13 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from groundstation.entry.bounded_text import bounded_text
 from groundstation.entry.entry_warning import EntryWarning
 from groundstation.entry.station_plausibility import design_warnings
 from groundstation.errors import SurveyError
 from groundstation.survey.files.field_files import read_any
 from groundstation.survey.wall.column_deviation import Tolerance, parse_tolerance
 from groundstation.survey.well.well_plan import PlanLeg, WellPlan
+from telemetry.bounded_bytes import bounded_text
 from telemetry.toml_tables import parse_toml_tables
 
 SAME = 1e-6  # m and deg

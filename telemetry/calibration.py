@@ -21,6 +21,7 @@ from typing import Any, NoReturn
 import numpy as np
 import numpy.typing as npt
 
+from telemetry.bounded_bytes import bounded_text
 from telemetry.errors import CalibrationError
 from telemetry.messages import Matrix3, Vector3
 from telemetry.parameters import POWERS, SensorParameters
@@ -168,7 +169,7 @@ def read_calibration(path: Path) -> Calibration:
         When the file cannot be read or holds no block.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = bounded_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise CalibrationError(f"{path}: expected a calibration, got {error}") from error
     try:

@@ -70,6 +70,9 @@ def test_what_a_crew_does_not_check_is_named_with_what_would(tmp_path: Path) -> 
         ("north-deg = 3.0", 2, "Error: expected north_std_deg beside the value that it is of"),
         ("nort-deg = 3.0", 2, "nort-deg: unknown key"),
         (f'joint = [["4-3", 12.5, 0.05]]\n{NORTH}', 0, "READY TO DRILL"),
+        (f"{NORTH}\ndepth-rate-mps = 0.5\nstale-after-s = 9", 0, "READY TO DRILL"),
+        ("depth-rate-mps = 50", 2, "depth_rate: expected a speed of the bit of 0.001..5 m/s, got 50.0"),
+        ("survey-after-s = 0", 2, "survey_after: expected a time of a stop of 5..3600 s, got 0.0"),
         ('joint = [["4", 12.5, 0.05]]\nnorth-std-deg = 0.3', 2, "joints.0.0: String should match pattern"),
     ],
 )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from borechain.cli.faults import InputFault
+from telemetry.bounded_bytes import bounded_bytes
 from telemetry.runtime.typed_options import Option
 
 if TYPE_CHECKING:
@@ -56,11 +57,9 @@ class PaperRequest:
 def logo_text(path: Path) -> str:
     """Text of a logo; errors as ``to_papers``."""
     try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_LOGO + 1)
-        text = content.decode("utf-8")
+        text = bounded_bytes(path, LARGEST_LOGO).decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputFault(f"--logo {path}: {getattr(error, 'strerror', None) or 'not a text'}") from error
-    if len(content) > LARGEST_LOGO or "<svg" not in text[:2000]:
-        raise InputFault(f"--logo {path}: expected an SVG of at most 1 MiB")
+    if "<svg" not in text[:2000]:
+        raise InputFault(f"--logo {path}: expected an SVG of at most {LARGEST_LOGO >> 20} MiB")
     return text

@@ -26,6 +26,7 @@ from telemetry.messages import BASE, Side
 
 LOOK_EVERY = 5.0  # s between two looks of an observer
 WORLDS = 8  # of a schedule; what a world draws and measures is worked out once a process of the machine
+BIAS_AFTER = 55.0  # s of rest in which a tube that has lost its memory finds the bias of its gyroscope
 RESTED = 100.0  # s that the string of a short schedule has rested and been heard before everything starts again
 
 
@@ -81,6 +82,12 @@ class GauntletRig:
         self._builders = dict(self.stepper.builders)
         self._folder, self._seed, self._strangers = folder, seed, itertools.count()
         self.off: dict[int, float] = {}  # since when (s), by address
+        # since when (s) a process that started on a disk that was changed meanwhile has run, by address
+        self.forgot_at: dict[int, float] = {}
+        self._frozen_at: dict[int, float] = {}
+        self.spoiled_until: dict[int, float] = {}  # s, by tube, until when its sensors failed
+        self.repaired = False  # the crew has cleared what it had seen
+        self._handled = {address: disk.handled for address, disk in disks.items()}
         self.before_cut: list[Callable[[], None]] = []
         self.after_step: list[Callable[[], None]] = []
         self._numbers = {address: address for address in disks}  # that the processes in their places give themselves
@@ -125,8 +132,11 @@ class GauntletRig:
         """Power a process on if it was cut."""
         if address not in self.off:
             return
-        del self.off[address]
+        cut_at = self.off.pop(address)
         self._take_place(address, tube)
+        if (handled := self._disks[address].handled) != self._handled[address]:
+            self._handled[address], self.forgot_at[address] = handled, self.now
+        self._interrupt(address, cut_at)
         self.scheduler.progress.wanted.append(address)
         self.stepper.follow(self.scheduler.progress)
 
@@ -137,11 +147,18 @@ class GauntletRig:
 
     def freeze(self, address: int) -> None:
         """Freeze a process: it gets no events."""
+        self._frozen_at[address] = self.now
         self.stepper.freeze(address)
 
     def thaw(self, address: int) -> None:
         """Thaw a process."""
         self.stepper.thaw(address)
+        self._interrupt(address, self._frozen_at.pop(address, math.inf))
+
+    def _interrupt(self, address: int, since: float) -> None:
+        """Note that a process went on after a pause: what a tube had begun to learn anew, it begins again."""
+        if since < self.forgot_at.get(address, -math.inf) + BIAS_AFTER:
+            self.forgot_at[address] = self.now
 
     def disk(self, address: int) -> FaultyDisk:
         """Return the disk of a process."""
@@ -173,28 +190,29 @@ class GauntletRig:
         """Drill until a time (s), or to the end, with each step at its time; ``observe`` is called now and then."""
         for step in steps:
             self.advance(step.at, observe)
+            self.spoiled_until.update(dict.fromkeys(self.world.spoilers, step.at))
             step.act(self)
             for listener in self.after_step:
                 listener()
         self.advance(until, observe)
 
     def repair(self) -> None:
-        """Give everything power and a working disk, and have the crew accept the depth."""
+        """Give everything power and a working disk; the crew answers what stands."""
+        self.repaired = True
         self.world.depth_hidden, self.world.depth_error = False, 0.0
         self.world.forget()
         for address in EVERYBODY:
             self._disks[address].refusal, self._disks[address].writes_left = 0, -1
             self.thaw(address)
             self.start(address)
-        if self.ground is not None and self._depth_is_doubted(self.ground):
-            self.inline.command("accept_depth", {"action": "confirm"})
+        self.answer_alarms()
 
-    @staticmethod
-    def _depth_is_doubted(ground: GroundProcess) -> bool:
-        """Whether a crew has to measure the depth of the bit and accept it."""
-        return bool(ground.model.string.depths.jumped) or any(
-            alarm.kind.code == "depth_refused" for alarm in ground.model.rig_alarms
-        )
+    def answer_alarms(self) -> None:
+        """Have the crew measure what is doubted, and tell it: depth, joints, north."""
+        for name in ("accept_depth", "accept_joints"):  # the first is refused where nothing speaks against the depth
+            self.order(name, {"action": "confirm"})
+        if self.ground is not None and self.ground.model.rig_alarms.stands("reference", "encoder"):
+            self.order("north", {"action": "tell", "angle_deg": f"{self.world.zero_deg:.6f}", "sigma_deg": "0.5"})
 
     def close(self) -> None:
         """Close the database."""

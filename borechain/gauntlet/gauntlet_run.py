@@ -8,15 +8,17 @@ import shutil
 import tempfile
 import time
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from borechain.drilling.rare_collection import rare_collection
+from borechain.gauntlet.covered_states import CoveredStates, Pair
 from borechain.gauntlet.fault_observability import FaultObservability
 from borechain.gauntlet.gauntlet_rig import PLANS, GauntletRig, make_ready, new_rig
 from borechain.gauntlet.oracles import Observer, find_violations
+from borechain.gauntlet.seams import drawn_seams, opened_seams
 from borechain.gauntlet.wellness import still_unwell
 from sim.gauntlet.fault_kinds import KINDS
 from sim.gauntlet.plan import drawn_kinds, steps_of
@@ -27,7 +29,27 @@ ALL = tuple(kind.name for kind in KINDS)
 USUAL = "minute"
 WORTH_A_PROCESS = 50  # seeds, for which a process more is started
 BATCH = 200  # seeds whose outcomes are given at a time
+ANSWERED_AFTER = 20.0  # s of calm, in which the crew sees what the last fault has raised
 FEW = 2  # kinds of faults that may never mislead the crew without a word, whatever can be seen
+
+
+class SeedJob(NamedTuple):
+    """What of a seed is run.
+
+    Attributes
+    ----------
+    allowed : kinds of faults that it draws from
+    kinds : that are switched on instead, whatever it draws
+    has_seams : the seams that it draws are opened while its faults last
+    covers : pairs of facts are noted
+    """
+
+    seed: int
+    allowed: Sequence[str] = ALL
+    kinds: Sequence[str] | None = None
+    plan: str = USUAL
+    has_seams: bool = False
+    covers: bool = False
 
 
 @dataclass(slots=True)
@@ -37,6 +59,7 @@ class SeedOutcome:
     seed: int
     kinds: tuple[str, ...]
     plan: str = USUAL
+    seams: dict[str, float] = field(default_factory=dict)
     violations: list[str] = field(default_factory=list)
     digest: str = ""
     alarms: list[str] = field(default_factory=list)
@@ -44,21 +67,30 @@ class SeedOutcome:
     told: dict[str, float] = field(default_factory=dict)  # s after the first fault, by alarm
     measurements: int = 0
     schedule: list[str] = field(default_factory=list)
+    pairs: set[Pair] = field(default_factory=set)  # of facts that were true at once, where they are noted
     cpu_s: float = field(default=0.0, compare=False)
 
 
 def run_seed(
-    seed: int, allowed: Sequence[str] = ALL, kinds: Sequence[str] | None = None, plan: str = USUAL
+    seed: int,
+    allowed: Sequence[str] = ALL,
+    kinds: Sequence[str] | None = None,
+    plan: str = USUAL,
+    has_seams: bool = False,
+    covers: bool = False,
 ) -> SeedOutcome:
-    """Drill under the faults of a seed and judge; ``kinds`` overrules what the seed switches on."""
+    """Drill under the faults of a seed and judge; arguments as ``SeedJob``."""
     outcome = SeedOutcome(seed, tuple(drawn_kinds(seed, allowed) if kinds is None else kinds), plan)
+    outcome.seams = drawn_seams(seed) if has_seams else {}
     make_ready(plan, [seed])
     began = time.process_time()
     folder = Path(tempfile.mkdtemp(prefix="gauntlet-"))
     try:
         with rare_collection():
             rig = new_rig(plan, seed, folder)
-            _run(rig, outcome)
+            covered = CoveredStates(rig) if covers else None
+            _run(rig, outcome, [covered.look] if covered is not None else [])
+            outcome.pairs = set() if covered is None else covered.pairs
             rig.close()
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
@@ -69,19 +101,17 @@ def run_seed(
     return outcome
 
 
-def judge_seed(job: tuple[int, Sequence[str], Sequence[str] | None, str]) -> SeedOutcome:
-    """Outcome of one seed, shrunk where it fails: seed, kinds to draw from, kinds to switch on instead, plan."""
+def judge_seed(job: SeedJob) -> SeedOutcome:
+    """Outcome of one seed, shrunk where it fails."""
     outcome = run_seed(*job)
     return shrink_outcome(outcome) if outcome.violations else outcome
 
 
-def judge_seeds(
-    seeds: Sequence[int], allowed: Sequence[str], kinds: Sequence[str] | None, plan: str
-) -> Iterator[SeedOutcome]:
-    """Outcomes of many seeds on all cores, in order; arguments as ``judge_seed``."""
-    with over_cores(len(seeds) // WORTH_A_PROCESS, lambda: None) as run_all:
-        for batch in (seeds[k : k + BATCH] for k in range(0, len(seeds), BATCH)):
-            yield from run_all(judge_seed, [(number, allowed, kinds, plan) for number in batch])
+def judge_seeds(jobs: Sequence[SeedJob]) -> Iterator[SeedOutcome]:
+    """Outcomes of many seeds on all cores, in order."""
+    with over_cores(len(jobs) // WORTH_A_PROCESS, lambda: None) as run_all:
+        for batch in (jobs[k : k + BATCH] for k in range(0, len(jobs), BATCH)):
+            yield from run_all(judge_seed, batch)
 
 
 def shrink_outcome(outcome: SeedOutcome) -> SeedOutcome:
@@ -89,24 +119,34 @@ def shrink_outcome(outcome: SeedOutcome) -> SeedOutcome:
     kept, worst = list(outcome.kinds), outcome
     for name in outcome.kinds:
         fewer = [other for other in kept if other != name]
-        tried = run_seed(outcome.seed, kinds=fewer, plan=outcome.plan) if fewer else worst
+        tried = (
+            run_seed(outcome.seed, kinds=fewer, plan=outcome.plan, has_seams=bool(outcome.seams)) if fewer else worst
+        )
         if fewer and tried.violations:
             kept, worst = fewer, tried
     return worst
 
 
-def _run(rig: GauntletRig, outcome: SeedOutcome) -> None:
+def _run(rig: GauntletRig, outcome: SeedOutcome, looks: Sequence[Callable[[], None]] = ()) -> None:
     chosen, world = PLANS[outcome.plan], rig.world
     begin = world.begin + chosen.rested
     until = world.end - chosen.calm
-    steps = steps_of(outcome.seed, outcome.kinds, begin + chosen.after_begin, until)
+    steps = steps_of(outcome.seed, outcome.kinds, begin + chosen.after_begin, until, recovers=not chosen.calm)
     outcome.schedule = [f"{step.at - begin:.1f} s {name}" for name, step in steps]
     is_of_few = len(outcome.kinds) <= FEW
     observer, sight = Observer(rig, steps[0][1].at, of_few=is_of_few), FaultObservability(rig)
-    rig.drill([step for _, step in steps], observer.look, until if chosen.calm else math.inf)
+
+    def look() -> None:
+        for one in (observer.look, *looks):
+            one()
+
+    with opened_seams(outcome.seams):
+        rig.drill([step for _, step in steps], look, until if chosen.calm else math.inf)
     if chosen.calm:
         rig.repair()
-        rig.advance(math.inf, observer.look)
+        rig.advance(until + ANSWERED_AFTER, look)
+        rig.answer_alarms()
+        rig.advance(math.inf, look)
     outcome.told = observer.told
     if rig.ground is None:
         outcome.violations = ["the ground station is not there at the end"]

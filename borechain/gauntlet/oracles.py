@@ -148,11 +148,11 @@ def find_violations(
     Where the encoder cannot be judged, its failure showing in nothing that measures, directions are not; where the
     depth cannot, neither is what it places and what it says is missing. Likewise of what a deception makes wrong, see
     ``sim.gauntlet.expected_doubts``. Events are not sent again, so an alarm that rests on them is lost with a database
-    that is deleted or replaced under a crew that has seen it.
+    that is deleted or replaced under a crew that has seen it, and what the crew has answered stands no longer.
     """
     shown = rig.inline.ask("alarms")
     standing = {row["code"] for row in shown["rig"]}
-    warned = standing | (set(seen) if rig.disk(BASE).handled else set())
+    warned = standing | (set(seen) if rig.disk(BASE).handled or rig.repaired else set())
     told = standing | {row["code"] for row in shown["rig_cleared"]}
     rows = rig.inline.ask("measurements")["measurements"]
     misled = misled_by(rig.world.deceptions)
@@ -200,7 +200,7 @@ def _depths(rows: list[dict[str, Any]], world: FaultyWorld) -> Iterator[str]:
     allowed = _rests(world)
     for row in rows:
         md, tube = row["md_m"], row["tube"]
-        if not _is_among((tube, md), allowed):
+        if not is_at_place((tube, md), allowed):
             yield f"tube {tube}: survey {row['sequence']} is placed at {md:.3f} m"
 
 
@@ -271,7 +271,7 @@ def _missing(rows: list[dict[str, Any]], rig: GauntletRig, standing: set[str]) -
     lacking = [
         f"tube {tube} at {md:.2f} m"
         for tube, md in _expected(rig)
-        if not _is_among((tube, md), [(row["tube"], row["md_m"]) for row in rows])
+        if not is_at_place((tube, md), [(row["tube"], row["md_m"]) for row in rows])
     ]
     if lacking and not standing & TOLD:
         yield f"no survey of {', '.join(lacking)}, and no alarm of it stands"
@@ -298,10 +298,10 @@ def _expected(rig: GauntletRig) -> list[tuple[int, float]]:
     heard = max((stand.ended_at for stand in string.depths.stands if stand.epoch == epoch), default=math.inf)
     late = {one.message.tube for one in waiting if one.message.station_at > heard}
     coming = [one for one in _nodes([(max(late, default=0), rig.world.bit_depth(rig.world.end))]) if one[0] in late]
-    return [one for one in owed if not _is_among(one, coming)]
+    return [one for one in owed if not is_at_place(one, coming)]
 
 
-def _is_among(one: tuple[int, float], others: list[tuple[int, float]]) -> bool:
+def is_at_place(one: tuple[int, float], others: list[tuple[int, float]]) -> bool:
     """Whether a tube is at its depth (m) in a list of both."""
     return any(one[0] == tube and abs(one[1] - md) <= DEPTH_TOLERANCE for tube, md in others)
 

@@ -31,6 +31,7 @@ from borechain.pki.pdf_revisions import (
     with_signature,
 )
 from borechain.pki.private_files import read_private_key
+from telemetry.bounded_bytes import bounded_bytes
 from telemetry.errors import KeyFileError
 
 SEQUENCE, SET, INTEGER, OCTETS, ATTRIBUTES = 0x30, 0x31, 0x02, 0x04, 0xA0  # tags of DER
@@ -90,7 +91,7 @@ def verify_report(pdf: bytes, authority: Path) -> list[Signer]:
 def read_certificate(path: Path) -> x509.Certificate:
     """Certificate of a file; errors as ``verify_report``."""
     try:
-        return x509.load_pem_x509_certificate(path.read_bytes())
+        return x509.load_pem_x509_certificate(bounded_bytes(path))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "not a certificate"
         raise KeyFileError(f"certificate {path}: {reason}; expected a .pem file of borechain pki") from None

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.entry.bounded_text import LARGEST_FILE
 from groundstation.entry.null_values import is_null
+from telemetry.bounded_bytes import bounded_bytes
 from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
@@ -56,12 +56,9 @@ def line_error(name: str, line: int, expected: str, got: str) -> CalibrationErro
 def read_bytes(path: Path) -> bytes:
     """Content of a file that is neither missing nor empty."""
     try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST_FILE + 1)
+        data = bounded_bytes(path)
     except OSError as error:
         raise CalibrationError(f"{path.name}: expected a file to read, got {error.strerror}") from error
-    if len(data) > LARGEST_FILE:
-        raise CalibrationError(f"{path.name}: expected a record of at most {LARGEST_FILE // 2**20} MiB, got more")
     if not data.strip():
         raise line_error(path.name, 1, "a record", "an empty file")
     return data

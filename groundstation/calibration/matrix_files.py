@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.calibration import block
+from telemetry.bounded_bytes import bounded_text
 from telemetry.errors import CalibrationError
 from telemetry.toml_tables import parse_toml_tables
 
@@ -28,7 +29,7 @@ def read_matrix(path: Path, unit: float = 1.0) -> Array:
     if path.suffix == ".json":
         return np.asarray(block.read_calibration(path).matrix * unit)
     try:
-        content = parse_toml_tables(path.read_text(encoding="utf-8"))
+        content = parse_toml_tables(bounded_text(path))
     except OSError as error:
         raise CalibrationError(f"{path.name}: expected a file to read, got {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -12,6 +12,7 @@ from typing import Any
 
 from groundstation.calibration.mwd_model import ACCELEROMETER_AXES, LOCAL, MAGNETOMETER_AXES, Triad
 from groundstation.calibration.mwd_solve import MwdFit
+from telemetry.bounded_bytes import bounded_text
 from telemetry.errors import CalibrationError
 
 FORMAT = 1
@@ -84,7 +85,7 @@ def read_triad(path: Path, sensor: str) -> TriadCalibration:
         When the file holds none, one of another sensor, or one that was changed after it was written.
     """
     try:
-        whole = json.loads(path.read_text(encoding="utf-8"))
+        whole = json.loads(bounded_text(path))
         content = whole["calibration"]
         block = TriadCalibration(**content | {"temperature_c": tuple(content["temperature_c"])})
         written, found = whole["sha256"], block.sha256()

@@ -26,10 +26,13 @@ class QuantityRange:
             Beginning with ``where``: what was expected and what came.
         """
         if not math.isfinite(value) or not self.low <= value <= self.high:
-            raise SurveyError(
-                f"{where}: expected {self.words} of {self.low:g}..{self.high:g} {self.unit}, got {value:g}"
-            )
+            raise SurveyError(f"{where}: expected {self.expected}, got {value:g}")
         return value
+
+    @property
+    def expected(self) -> str:
+        """The quantity with its range and its unit, in words."""
+        return f"{self.words} of {self.low:g}..{self.high:g} {self.unit}"
 
 
 RANGES = {
@@ -48,4 +51,9 @@ RANGES = {
     "coordinate": QuantityRange("a coordinate", -1e8, 1e8, "m"),  # of a national grid, its zone's number before it
     "distance": QuantityRange("a distance", -1e6, 1e6, "m"),  # on one site
     "depth": QuantityRange("a depth or a length", -1e5, 1e5, "m"),
+    "depth_rate": QuantityRange("a speed of the bit", 1e-3, 5.0, "m/s"),  # a hoist without a load makes two
+    "depth_gap": QuantityRange("a time between two depths", 0.1, 600.0, "s"),
+    "survey_after": QuantityRange("a time of a stop", 5.0, 3600.0, "s"),
+    "stale_after": QuantityRange("a time of silence", 1.0, 600.0, "s"),  # a state comes every second
+    "station_tolerance": QuantityRange("a distance of two surveys at one station", 1e-3, 1.0, "m"),
 }

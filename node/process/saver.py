@@ -17,7 +17,7 @@ from node.errors import SavedStateError
 from node.firmware.saved_layouts import CarriedState
 from node.kernels.arithmetic.formats import Array
 from node.process.journal import SLOTS, Journal
-from telemetry.application.endpoint_state import STATE_LAYOUT, layout_of
+from telemetry.application.endpoint_state import STATE_LAYOUT, UNOWNED, layout_of, owner_of
 from telemetry.messages import Scalar, Severity
 from telemetry.runtime.disk import MACHINE, Disk
 
@@ -33,13 +33,19 @@ Say = Callable[[Severity, str, dict[str, Scalar]], None]
 class Saver:
     """Saved state of one node in ``folder``.
 
+    Parameters
+    ----------
+    folder, disk : where it is
+    tube : whose state is loaded; that of another is not
+
     Attributes
     ----------
     fault : why nothing was loaded although there was something, or empty
     due : what must not be lost waits for the end of this cycle or frame
     """
 
-    def __init__(self, folder: Path, disk: Disk = MACHINE) -> None:
+    def __init__(self, folder: Path, disk: Disk = MACHINE, tube: int | None = None) -> None:
+        self._tube = tube
         self._journal = Journal(folder, disk=disk)
         self._cycles = 0  # since the last save
         self._allowed = AT_ONCE  # saves that may still follow at once
@@ -63,8 +69,12 @@ class Saver:
         except SavedStateError as error:
             self.fault = str(error)
             return None
-        if saved is not None and (layout := layout_of(saved[1])) != STATE_LAYOUT:
+        if saved is not None and (layout := layout_of(saved[1])) not in (STATE_LAYOUT, UNOWNED):
             self.fault = f"saved state: expected telemetry of layout {STATE_LAYOUT}, got {layout}"
+            return None
+        owner = None if saved is None or self._tube is None else owner_of(saved[1])
+        if owner not in (None, self._tube):
+            self.fault = f"it is that of tube {owner}: was a board, a card or a folder exchanged?"
             return None
         self._saved_still = saved is not None and is_still(saved[0])
         return saved

@@ -51,7 +51,7 @@ from telemetry.messages import (
     StaticRecord,
     SurveyMeasurement,
 )
-from telemetry.presentation.msgpack_codec import encode_message
+from telemetry.presentation.msgpack_codec import decode_message, encode_message
 from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.joint_watch import JointFault
 from telemetry.runtime.process_interface import Process
@@ -115,7 +115,7 @@ class TubeProcess(Process):
         if config is None:
             config = sensor_config(settings, parameters) if imus else default_config()
         self.config = config
-        self._saver = Saver(folder, disk)
+        self._saver = Saver(folder, disk, settings.tube)
         # apart from the saved state: a node that lost its state must not look like an earlier boot
         counter = BootCounter(folder, disk=disk)
         self.boots, self._counter_fault = counter.boots, counter.fault
@@ -323,11 +323,14 @@ class TubeProcess(Process):
 
     def _resend(self, first: int, last: int) -> tuple[int, int]:
         """Send the surveys and records of these numbers again; how many, and from which number all are kept."""
-        found = self._log.payloads(first, last)[:RESENT_TOGETHER]
+        mail, logged = self.endpoint.mail, self._log.payloads(first, last)
+        # of another tube's memory, which was put into this one, nothing is this one's
+        found = [one for one in logged if decode_message(one[1]).tube == self.settings.tube][:RESENT_TOGETHER]  # type: ignore[union-attr]
+        waiting = mail.hasten(first, last, self._now)
         for sequence, payload in found:
-            self.endpoint.mail.submit_again(sequence, payload, self._now)
+            mail.submit_again(sequence, payload, self._now)
         self._saver.due = self._saver.due or bool(found)
-        return len(found), self._log.complete_from
+        return len(waiting.union(sequence for sequence, _ in found)), self._log.complete_from
 
     def _report_drops(self, now: float) -> None:
         """Tell the ground station, at most once a minute, that a queue of this node was full."""

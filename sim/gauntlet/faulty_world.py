@@ -20,6 +20,7 @@ from sim.world.world import World
 from telemetry.messages import ENCODER
 
 TUBE_LENGTH = 2.0  # m
+COUNTS = 4096  # of a turn of the encoder
 COMMON: dict[str, Any] = {
     "rig": {"tubes": 2, "tube_length_m": TUBE_LENGTH, "tubes_at_start": 2},
     "path": {"straight": {"inclination_deg": 3.0, "azimuth_deg": 40.0}},
@@ -30,9 +31,12 @@ MINUTE = COMMON | {
     "schedule": {"add_s": 110.0, "stop_s": 30.0, "finish_s": 22.0, "blocks": 1},
     "rotation": {"turns": 1.5, "advance_m": 0.8},
 }
-# the same, and a minute in which no fault begins
+# the same and a long rest, then a minute without a fault in which it drills on and is surveyed once more
 CALM_S = 60.0
-CALMED = MINUTE | {"schedule": MINUTE["schedule"] | {"finish_s": MINUTE["schedule"]["finish_s"] + CALM_S}}
+CALMED = MINUTE | {
+    "rig": COMMON["rig"] | {"depth_at_start_m": 2.3},
+    "schedule": MINUTE["schedule"] | {"finish_s": 9.0, "blocks": 2},
+}
 # the tubes are drilled in one after the other
 DRILLED_IN = COMMON | {
     "rig": {"tubes": 2, "tube_length_m": TUBE_LENGTH},
@@ -102,6 +106,11 @@ class FaultyWorld(World):
         self._deceivers: dict[int, list[Callable[[Reading], Reading]]] = {}
         self._scales: list[tuple[float, float]] = []  # depth of the bit, m, from which on it counts so much more
         self._leaned: Borehole | None = None
+
+    @property
+    def zero_deg(self) -> float:
+        """Where the zero of the encoder points now, from site north, clockwise."""
+        return -360.0 * self.slipped / COUNTS
 
     def add_deceiver(self, tube: int, change: Callable[[Reading], Reading]) -> None:
         """Have a tube's readings changed from now on, in a way that its node cannot see."""

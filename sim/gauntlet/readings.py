@@ -7,11 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from sim.gauntlet.fault import Draw, Faulty, Step, draw_interval, drawn_tube, lasting_fault
-from sim.gauntlet.faulty_world import Reading
+from sim.gauntlet.faulty_world import COUNTS, Reading
 from telemetry.messages import ENCODER, DepthReading
 from telemetry.presentation.msgpack_codec import encode_message
-
-COUNTS = 4096  # of a turn
 
 
 def spoil_sensor(spoil: Callable[[Reading], Reading]) -> Draw:

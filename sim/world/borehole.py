@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.errors import ScenarioError
+from telemetry.bounded_bytes import bounded_text
 
 Array = npt.NDArray[np.float64]
 STRAIGHT = 1e-12  # rad, below which an arc is a line
@@ -158,7 +159,7 @@ def read_stations(path: Path) -> tuple[Array, Array, Array]:
 
 def _columns(path: Path, names: tuple[str, ...]) -> list[Array]:
     try:
-        lines = path.read_text().splitlines()
+        lines = bounded_text(path).splitlines()
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise ScenarioError(f"{path}: {reason}; expected a CSV file with {', '.join(names)}") from error

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from sim.errors import ScenarioError
+from telemetry.bounded_bytes import bounded_text
 from telemetry.toml_tables import parse_toml_tables
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -26,7 +27,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         When the file cannot be read or is not TOML.
     """
     try:
-        return parse_toml_tables(path.read_text("utf-8"))
+        return parse_toml_tables(bounded_text(path))
     except OSError as error:
         raise ScenarioError(
             f"{path}: {error.strerror}; expected a scenario file, or a name of borechain scenario list"

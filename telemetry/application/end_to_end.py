@@ -93,6 +93,12 @@ class EndToEndDelivery:
         """Send once more what was receipted before, because the ground station asks for it."""
         self._outbox.keep_payload(sequence, payload, now)
 
+    def hasten(self, first: int, last: int, now: float) -> set[int]:
+        """Send what is kept of these numbers now, because the ground station misses it; returns their numbers."""
+        hastened = self._outbox.make_due(now, first, last)
+        self._send_kept(now)
+        return hastened
+
     def hold(self) -> None:
         """Hold all kept messages back until ``release``, because the disk must be written first."""
         self._holding = True
@@ -185,7 +191,7 @@ class EndToEndDelivery:
 
     def export_state(self, hops: int) -> bytes:
         """Pack what a restart needs: numbers, unreceipted messages, answered commands, hops from the top."""
-        return pack_state(self.series.following, self._outbox.contents(), self._answers.contents(), hops)
+        return pack_state(self.series.following, self._outbox.contents(), self._answers.contents(), hops, self._address)
 
     def restore(self, saved: SavedState) -> None:
         """Continue from a saved state."""

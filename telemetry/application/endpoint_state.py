@@ -11,7 +11,8 @@ from telemetry.messages import HOPS_UNKNOWN, MAX_TUBE, Event, Message, Severity
 from telemetry.presentation.msgpack_codec import decode_message
 from telemetry.schema import U53
 
-STATE_LAYOUT = "endpoint-1"  # of what is saved; counted up when it changes
+STATE_LAYOUT = "endpoint-2"  # of what is saved; counted up when it changes
+UNOWNED = "endpoint-1"  # the layout before, which does not name its process
 
 
 def layout_of(saved: bytes) -> str:
@@ -21,6 +22,15 @@ def layout_of(saved: bytes) -> str:
     except (ValueError, TypeError, LookupError, msgpack.UnpackException):
         return "unnamed"
     return name if isinstance(name, str) else "unnamed"
+
+
+def owner_of(saved: bytes) -> int | None:
+    """Address of the process whose exported state it is; None where it does not name one."""
+    try:
+        owner = msgpack.unpackb(saved)[5]
+    except (ValueError, TypeError, LookupError, msgpack.UnpackException):
+        return None
+    return owner if type(owner) is int else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,10 +44,10 @@ class SavedState:
 
 
 def pack_state(
-    next_sequence: int, parcels: list[list[int | bytes]], answered: list[tuple[int, bytes]], hops: int
+    next_sequence: int, parcels: list[list[int | bytes]], answered: list[tuple[int, bytes]], hops: int, owner: int
 ) -> bytes:
-    """Bytes of a state."""
-    return bytes(msgpack.packb([STATE_LAYOUT, next_sequence, parcels, answered, hops]))
+    """Bytes of a state of the process with the address ``owner``."""
+    return bytes(msgpack.packb([STATE_LAYOUT, next_sequence, parcels, answered, hops, owner]))
 
 
 def parse_state(saved: bytes) -> SavedState:
@@ -49,11 +59,11 @@ def parse_state(saved: bytes) -> SavedState:
         When they are not a state, or hold an invalid message; the process then starts without one.
     """
     try:
-        layout, next_sequence, parcels, answered, hops = msgpack.unpackb(saved, max_ext_len=0)
+        layout, next_sequence, parcels, answered, hops, *owner = msgpack.unpackb(saved, max_ext_len=0)
         kept, answers = [_parcel(row) for row in parcels], [_parcel(row) for row in answered]
     except (ValueError, TypeError, RecursionError, msgpack.UnpackException) as error:
         raise DecodeError(f"saved state: {error}") from error
-    if layout != STATE_LAYOUT:
+    if (layout, len(owner)) not in ((STATE_LAYOUT, 1), (UNOWNED, 0)):
         raise DecodeError(f"saved state: expected layout {STATE_LAYOUT}, got {layout!r:.40}")
     if type(next_sequence) is not int or not 1 <= next_sequence <= U53:
         raise DecodeError(f"saved state: next number: expected 1..2^53, got {next_sequence!r:.40}")

@@ -7,6 +7,8 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from telemetry.schema import U53
+
 FIRST_RETRY = 10.0  # s
 LAST_RETRY = 60.0  # s
 LIMIT = 256  # payloads kept; of more the oldest that may be lost goes
@@ -77,10 +79,12 @@ class Outbox:
                 parcel.send_at, hastened = now, True
         return hastened
 
-    def make_due(self, now: float) -> None:
-        """Make everything due now: its receiver can take it from now on."""
-        for parcel in self._parcels.values():
-            parcel.send_at = now
+    def make_due(self, now: float, first: int = 0, last: int = U53) -> set[int]:
+        """Make what is kept of these numbers due now, for its receiver can take it; returns the numbers."""
+        found = {number for number in self._parcels if first <= number <= last}
+        for number in found:
+            self._parcels[number].send_at = now
+        return found
 
     def next_due(self) -> float:
         """Time (s) at which something is due, infinite if nothing is kept."""

@@ -20,6 +20,7 @@ from zipfile import BadZipFile
 import numpy as np
 import numpy.typing as npt
 
+from telemetry.bounded_bytes import LARGEST_LOG, bounded_bytes
 from telemetry.errors import LoggerError
 
 Array = npt.NDArray[np.float64]
@@ -55,7 +56,7 @@ def read_logged_cells(path: Path) -> LoggedCells:
         When there is no such file, it is empty or holds no rows of numbers, or two records of other columns.
     """
     try:
-        data = path.read_bytes()
+        data = bounded_bytes(path, LARGEST_LOG)
     except OSError as error:
         raise LoggerError(f"{path.name}: expected a file to read, got {error.strerror}") from error
     if not data.strip():

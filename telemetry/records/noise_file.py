@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from telemetry.bounded_bytes import bounded_text
 from telemetry.errors import LoggerError
 from telemetry.messages import Vector3
 from telemetry.records.sensor_columns import RATE, UNITS
@@ -35,7 +36,7 @@ def read_gyro_noise(path: Path) -> GyroNoise:
         When it cannot be read, is of another sensor, or holds a number that no gyroscope has.
     """
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(bounded_text(path))
         unit, axes = found["unit"], [found["axes"][axis]["filter"] for axis in AXES]
     except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise LoggerError(

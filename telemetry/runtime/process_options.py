@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from telemetry import keys
+from telemetry.bounded_bytes import bounded_text
 from telemetry.errors import MediumError
 from telemetry.media.credentials import needs_tls
 from telemetry.media.media_table import check_medium
@@ -29,7 +30,7 @@ def read_config(context: click.Context, _parameter: click.Parameter, path: Path 
     if path is None:
         return
     try:
-        values = parse_toml_tables(path.read_text())
+        values = parse_toml_tables(bounded_text(path))
     except OSError as error:
         raise click.BadParameter(f"{path}: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from cryptography import x509
 
+from telemetry.bounded_bytes import bounded_bytes
+
 WARNED = datetime.timedelta(days=30)  # before its end
 SUFFIX = ".pem"
 
@@ -14,7 +16,7 @@ SUFFIX = ".pem"
 def certificate_trouble(path: Path, now: datetime.datetime) -> str:
     """What is wrong with the dates of a certificate at ``now`` (UTC), or with its file; empty if nothing is."""
     try:
-        certificate = x509.load_pem_x509_certificate(path.read_bytes())
+        certificate = x509.load_pem_x509_certificate(bounded_bytes(path))
     except (OSError, ValueError):
         return f"{path}: expected a certificate in PEM, got something else"
     begin, end = certificate.not_valid_before_utc, certificate.not_valid_after_utc

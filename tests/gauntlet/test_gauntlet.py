@@ -2,7 +2,7 @@
 
 import json
 from functools import cache
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 import pytest
@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from borechain.cli.gauntlet.gauntlet import gauntlet
 from borechain.gauntlet.gauntlet_rig import WORLDS
-from borechain.gauntlet.gauntlet_run import ALL, USUAL, judge_seed, run_seed
+from borechain.gauntlet.gauntlet_run import ALL, SeedJob, judge_seed, run_seed
 from sim.gauntlet.fault_kinds import KINDS
 from sim.gauntlet.faulty_world import MINUTE, FaultyWorld
-from sim.gauntlet.plan import drawn_kinds, steps_of
+from sim.gauntlet.plan import combined_kinds, drawn_kinds, steps_of
 from sim.world.random_streams import random_stream
 from telemetry.messages import BASE, ENCODER
 
@@ -42,6 +42,14 @@ def test_seeds_switch_on_different_mixtures_and_always_something() -> None:
     assert len(mixtures) > 150
     assert all(mixtures)
     assert 1.5 < np.mean([len(kinds) for kinds in mixtures]) < 5.0
+
+
+@given(st.integers(1, 12), st.integers(1, 4), st.integers(0, 10**7))
+def test_seeds_in_a_row_bring_every_combination_once(kinds: int, together: int, first: int) -> None:
+    names = ALL[: max(kinds, together)]
+    every = list(combinations(names, together))
+    found = [combined_kinds(seed, names, together) for seed in range(first, first + len(every))]
+    assert sorted(found) == sorted(every)
 
 
 @given(
@@ -78,7 +86,7 @@ def test_seeds_hold_and_repeat_bit_for_bit(seed: int) -> None:
 def test_combined_seeds_hold(world: int, part: int) -> None:
     # each worker computes one world, not all of them
     seeds = [seed for seed in range(1, COMBINED + 1) if seed % WORLDS == world][part::PARTS]
-    failed = [outcome for seed in seeds if (outcome := judge_seed((seed, ALL, None, USUAL))).violations]
+    failed = [outcome for seed in seeds if (outcome := judge_seed(SeedJob(seed))).violations]
     assert [(outcome.seed, outcome.kinds, outcome.violations) for outcome in failed] == []
 
 
@@ -177,7 +185,7 @@ def test_seeds_of_a_string_that_is_drilled_in_hold(seed: int) -> None:
 def test_two_thousand_seeds_hold(plan: str, count: int, block: int) -> None:
     first = 10_000 + count * block
     failed = [
-        outcome for seed in range(first, first + count) if (outcome := judge_seed((seed, ALL, None, plan))).violations
+        outcome for seed in range(first, first + count) if (outcome := judge_seed(SeedJob(seed, plan=plan))).violations
     ]
     assert [(outcome.seed, outcome.kinds, outcome.violations) for outcome in failed] == []
 

@@ -81,6 +81,16 @@ def test_without_north_the_answer_is_dont_know_with_its_name(tmp_path: Path) -> 
     assert rig.ask("verdict")["verdict"] == verdict["by_surveys"]
 
 
+@pytest.mark.parametrize("action", ["tell", "check"])
+def test_a_bearing_of_the_encoders_zero_answers_the_alarm_that_it_may_have_slipped(tmp_path: Path, action: str) -> None:
+    rig = drilled(tmp_path, north_std_deg=0.2)
+    rig.ground.model.rig_alarms.alert("reference", "encoder", "tubes 1, 2 at 1007 s")
+    order(rig, "stick_up", action="tell", height_m=0.1, sigma_m=0.01)
+    assert "reference" in rig.alarms()
+    order(rig, "north", action=action, angle_deg=0, sigma_deg=0.1)
+    assert "reference" not in rig.alarms()
+
+
 @pytest.mark.parametrize("north_deg", [30.0, -170.0, 359.0])
 def test_north_turns_every_survey_of_before_and_is_taken_back(tmp_path: Path, north_deg: float) -> None:
     rig = drilled(tmp_path, 3)

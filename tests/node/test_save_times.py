@@ -22,14 +22,14 @@ from node.process.journal import Journal
 from node.process.saver import AT_ONCE, RETRY_EVERY, SAVE_EVERY, SPACING, Saver
 from node.process.tube_process import TubeProcess
 from telemetry.application.clock import ClockFilter
-from telemetry.application.endpoint_state import STATE_LAYOUT
-from telemetry.messages import ENCODER, Aiding, Command, Hello, NodeMode, Side, TimeReply
+from telemetry.application.endpoint_state import STATE_LAYOUT, parse_state
+from telemetry.messages import ENCODER, Aiding, Command, Event, Hello, NodeMode, Severity, Side, TimeReply
 from telemetry.presentation.msgpack_codec import encode_message, open_payload
 from telemetry.schema import MessageKind
 from telemetry.transport.hop import HopLink, parse_frame
 
 FOLDER = Path("/node")
-BLOB = msgpack.packb([STATE_LAYOUT, 1, [], [], 0])
+BLOB = msgpack.packb([STATE_LAYOUT, 1, [], [], 0, 1])
 REST = (0.0, 0.0, 0.0, 0.0, 0.3, -9.8)
 
 
@@ -207,18 +207,51 @@ def test_nothing_that_is_kept_leaves_before_it_is_on_the_disk(tmp_path: Path) ->
 
 def test_surveys_that_are_sent_again_are_saved_with_the_next_frame(tmp_path: Path) -> None:
     process = TubeProcess(TubeSettings(3), tmp_path)
-    for number in (5, 6):
-        process._log.append_payload(number, b"payload %d" % number)
+    for number, tube in ((5, 3), (6, 3), (7, 4)):  # the last of another tube's memory
+        process._log.append_payload(
+            number, encode_message(Event(tube, number, 1000.0, Severity.ERROR, "logged", {}, 1))
+        )
     process._saver.due = False
     assert process._resend(1, 4)[0] == 0
     assert not process._saver.due
     assert process._resend(5, 6) == (2, 0)
     assert process._saver.due
     assert process._resend(6, 6)[0] == 1
+    assert process._resend(7, 7)[0] == 0
+    assert sorted(number for number, _, _ in parse_state(process.endpoint.export_state()).parcels) == [5, 6]
     for first, last, sent in ((5, 6, 2), (6, 6, 1), (5, 5, 1), (6, 5, None)):
         reply = process._commands.obey(Command(3, 9, "resend", {"first": first, "last": last}))
         assert reply.done == (sent is not None)
         assert reply.values.get("sent") == sent
+
+
+def test_what_is_kept_is_sent_at_once_when_it_is_asked_for(tmp_path: Path) -> None:
+    process = TubeProcess(TubeSettings(3), tmp_path)
+    process._send_event(Severity.WARNING, "kept", {})
+    waiting = process.endpoint.mail._outbox
+    number = process.endpoint.mail.series.newest
+    assert waiting.next_due() > process._now
+    assert process._resend(number, number + 5)[0] == 1
+    assert process._resend(number + 1, number + 5)[0] == 0
+
+
+def test_a_memory_of_another_tube_is_refused_by_name(tmp_path: Path) -> None:
+    other = TubeProcess(TubeSettings(2), tmp_path)
+    other._send_event(Severity.WARNING, "kept", {})
+    other.close()
+    process = TubeProcess(TubeSettings(1), tmp_path)
+    assert process._saver.fault == "it is that of tube 2: was a board, a card or a folder exchanged?"
+    assert process.endpoint.mail.outbox_size == 0
+    assert not process.tube._restored
+
+
+def test_the_same_tube_goes_on_with_its_memory(tmp_path: Path) -> None:
+    before = TubeProcess(TubeSettings(2), tmp_path)
+    before._send_event(Severity.WARNING, "kept", {})
+    before.close()
+    again = TubeProcess(TubeSettings(2), tmp_path)
+    assert again._saver.fault == ""
+    assert again.endpoint.mail.outbox_size == 1
 
 
 @pytest.mark.parametrize("off", [1e-3, -1e-3])

@@ -172,7 +172,7 @@ def test_telemetry_of_another_layout_is_refused_by_name(tmp_path: Path) -> None:
     blob = msgpack.packb(msgpack.unpackb(first.endpoint.export_state())[1:])
     Journal(tmp_path).save(first.nodes, blob)
     again = TubeProcess(TubeSettings(3), tmp_path)
-    assert again._saver.fault == "saved state: expected telemetry of layout endpoint-1, got unnamed"
+    assert again._saver.fault == "saved state: expected telemetry of layout endpoint-2, got unnamed"
     assert not again.state[0]["static_bias_var"].any()
 
 

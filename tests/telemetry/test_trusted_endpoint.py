@@ -91,7 +91,9 @@ BAD = st.none() | st.booleans() | st.integers() | st.floats() | st.text() | st.b
 
 @given(
     st.tuples(BAD, BAD, BAD, BAD, BAD)
-    | st.tuples(st.just(STATE_LAYOUT), st.just(5), st.lists(st.tuples(BAD, BAD)), st.just([]), st.integers())
+    | st.tuples(
+        st.just(STATE_LAYOUT), st.just(5), st.lists(st.tuples(BAD, BAD)), st.just([]), st.integers(), st.integers()
+    )
 )
 def test_a_state_that_is_none_is_not_believed(rows: tuple[object, ...]) -> None:
     try:

@@ -15,7 +15,8 @@ from telemetry.runtime.typed_options import gather_options
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from borechain.gauntlet.gauntlet_run import SeedOutcome
+    from borechain.gauntlet.covered_states import Pair
+    from borechain.gauntlet.gauntlet_run import SeedJob, SeedOutcome
     from borechain.gauntlet.soak import SoakSample
 
 COLUMNS = tuple(
@@ -34,11 +35,34 @@ class GauntletRequest:
     faults: str | None
     exactly: str | None
     plan: str
+    together: int | None
+    has_seams: bool
+    covers: bool
 
     @property
     def numbers(self) -> list[int]:
         """Every seed."""
         return [self.seed] if self.seed is not None else list(range(self.first, self.first + self.seeds))
+
+    def to_jobs(self) -> list[SeedJob]:
+        """What is run of every seed; InputFault for kinds that are none, or too few to combine."""
+        from borechain.gauntlet.gauntlet_run import ALL, SeedJob
+        from sim.gauntlet.plan import combined_kinds
+
+        allowed, exactly = _names(self.faults, "--faults", ALL), _names(self.exactly, "--exactly", ()) or None
+        if self.together is not None and (exactly is not None or self.together > len(allowed)):
+            raise InputFault(f"--together {self.together}: expected as many --faults at least, and no --exactly")
+        return [
+            SeedJob(
+                seed,
+                allowed,
+                exactly if self.together is None else combined_kinds(seed, allowed, self.together),
+                self.plan,
+                self.has_seams,
+                self.covers,
+            )
+            for seed in self.numbers
+        ]
 
 
 gauntlet_options = gather_options(
@@ -55,6 +79,20 @@ gauntlet_options = gather_options(
         show_default=True,
         help="A string that drills for a minute; the same and a calm minute, after which all is to be well; "
         "or one that is drilled in tube by tube.",
+    ),
+    click.option(
+        "--together",
+        type=click.IntRange(1, 4),
+        help="So many kinds in each seed: seeds in a row go through all pairs, threes or fours.",
+    ),
+    click.option(
+        "--seams",
+        "has_seams",
+        is_flag=True,
+        help="Open seams of the product itself too: early timeouts, queues with hardly any room.",
+    ),
+    click.option(
+        "--coverage", "covers", is_flag=True, help="Count pairs of facts about the rig that were true at once."
     ),
     click.option(
         "--soak", "hours", type=click.FloatRange(1.0), help="Instead, hours of rig time of one rig under faults."
@@ -78,7 +116,8 @@ def gauntlet(request: GauntletRequest, listed: bool, hours: float | None, out: P
     Examples:
       borechain gauntlet --seeds 100
       borechain gauntlet --seed 17 --exactly node-cut,loss
-      borechain gauntlet --seeds 100 --plan calmed
+      borechain gauntlet --seeds 100 --plan calmed --seams
+      borechain gauntlet --seeds 2000 --together 2 --coverage
       borechain gauntlet --soak 24
     """
     if listed:
@@ -107,15 +146,15 @@ def run_seeds(request: GauntletRequest, *, as_json: bool) -> None:
     EnvironmentFault
         When one has failed.
     """
-    from borechain.gauntlet.gauntlet_run import ALL, judge_seeds
+    from borechain.gauntlet.gauntlet_run import judge_seeds
 
-    allowed, kinds = _names(request.faults, "--faults", ALL), _names(request.exactly, "--exactly", ()) or None
-    numbers, failed, cpu_s = request.numbers, 0, 0.0
-    for outcome in judge_seeds(numbers, allowed, kinds, request.plan):
+    numbers, failed, cpu_s, pairs = request.numbers, 0, 0.0, set[Pair]()
+    for outcome in judge_seeds(request.to_jobs()):
         failed += bool(outcome.violations)
         cpu_s += outcome.cpu_s
+        pairs |= outcome.pairs
         _show(outcome, as_json=as_json)
-    _show_figures(len(numbers), failed, cpu_s, as_json=as_json)
+    _show_figures(len(numbers), failed, cpu_s, len(pairs) if request.covers else None, as_json=as_json)
     if failed:
         raise EnvironmentFault(f"{failed} of {len(numbers)} seeds failed; each is named above with what repeats it")
 
@@ -138,6 +177,7 @@ def _show(outcome: SeedOutcome, *, as_json: bool) -> None:
     row: dict[str, Any] = {
         "seed": outcome.seed,
         "faults": list(outcome.kinds),
+        "seams": outcome.seams,
         "violations": outcome.violations,
         "alarms": outcome.alarms,
         "cleared": outcome.cleared,
@@ -152,7 +192,8 @@ def _show(outcome: SeedOutcome, *, as_json: bool) -> None:
         for line in outcome.schedule:
             click.echo(f"  {line}")
         plan = f" --plan {outcome.plan}" if outcome.plan != USUAL else ""
-        click.echo(f"  borechain gauntlet --seed {outcome.seed} --exactly {','.join(outcome.kinds)}{plan}")
+        seams = " --seams" if outcome.seams else ""
+        click.echo(f"  borechain gauntlet --seed {outcome.seed} --exactly {','.join(outcome.kinds)}{plan}{seams}")
 
 
 def _soak(hours: float, seed: int, out: Path | None, *, as_json: bool) -> None:
@@ -189,8 +230,8 @@ def _keep(samples: Sequence[SoakSample], out: Path) -> None:
     save_figure(soak_figure(samples), out / "soak.svg")
 
 
-def _show_figures(seeds: int, failed: int, cpu_s: float, *, as_json: bool) -> None:
-    """How many seeds ran and failed, and how many a minute of one core."""
+def _show_figures(seeds: int, failed: int, cpu_s: float, pairs: int | None, *, as_json: bool) -> None:
+    """How many seeds ran and failed, how many a minute of one core, and how many pairs of facts they covered."""
     a_minute = 60.0 * seeds / cpu_s
     if as_json:
         figures = {
@@ -198,7 +239,8 @@ def _show_figures(seeds: int, failed: int, cpu_s: float, *, as_json: bool) -> No
             "failed": failed,
             "cpu_s": round(cpu_s, 2),
             "runs_per_cpu_minute": round(a_minute, 1),
-        }
+        } | ({} if pairs is None else {"pairs": pairs})
         click.echo(json.dumps(figures))
     else:
-        click.echo(f"{seeds} seeds, {failed} failed, {a_minute:.0f} a minute of one core")
+        covered = "" if pairs is None else f", {pairs} pairs of facts"
+        click.echo(f"{seeds} seeds, {failed} failed, {a_minute:.0f} a minute of one core{covered}")

@@ -9,10 +9,10 @@ import click
 
 from borechain.cli.faults import plain_faults
 from borechain.cli.whole_files import write_whole
+from telemetry.bounded_bytes import bounded_bytes
 from telemetry.runtime.command_line import InputFault
 
 CHANGED = 3  # exit status
-LARGEST = 64 * 2**20  # bytes of a report
 report_argument = click.argument("report", type=click.Path(path_type=Path, dir_okay=False))
 
 
@@ -94,10 +94,6 @@ def read_report(path: Path) -> bytes:
         When it cannot be read or is larger than any report.
     """
     try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST + 1)
+        return bounded_bytes(path)
     except OSError as error:
         raise InputFault(f"{path}: {error.strerror}; expected a report, a .pdf file") from error
-    if len(content) > LARGEST:
-        raise InputFault(f"{path}: expected a report of at most {LARGEST // 2**20} MiB, got more")
-    return content

@@ -69,7 +69,8 @@ KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "reference",
         BAD,
-        "the encoder may have slipped: gyroscopes contradict it at once, or none has watched it; check the azimuths",
+        "the encoder may have slipped: gyroscopes contradict it at once, or none has watched it; check the azimuths, "
+        "and tell north by a new bearing, which ends it",
     ),
     AlarmKind(
         "joint",

@@ -28,6 +28,7 @@ PLACED_WITHIN = 5.0  # s of rig time after which a survey without a depth is tol
 GAP_AFTER = 30.0  # s that a number may be on its way
 ASK_EVERY = 120.0  # s between two orders to send a range again
 ASKED_AT_MOST = 3
+COMES_WITHIN = 10.0  # s of an answer, in which what was sent again has come
 REFUSALS = 3  # readings of the depth refused in a row until that is told
 SENSOR = NodeFlag.SENSOR_FAULT | NodeFlag.YAW_UNTRUSTED | NodeFlag.RATE_EXCEEDED
 AT_REST = (NodeMode.STILL, NodeMode.SURVEY)
@@ -40,6 +41,7 @@ class Gap:
 
     numbers: Range
     found_at: float  # s, own clock
+    newest: int  # number that the tube had given out by then
     asked_at: float = -math.inf
     asked: int = 0
     complete_from: int = 0  # number from which on the tube has kept its surveys
@@ -183,12 +185,13 @@ class Watch:
                 asked.append((tube, gap.numbers))
         return asked
 
-    def on_resent(self, tube: int, sent: int, complete_from: int, now: float) -> None:
-        """A tube has answered; what it does not have any more will not come."""
+    def on_resent(self, tube: int, first: int, sent: int, complete_from: int, now: float) -> None:
+        """A tube has answered for numbers from ``first`` on; what it does not have any more will not come."""
         gap = self._gaps.get(tube)
-        if gap is not None:
+        if gap is not None and gap.numbers[0] == first:
             gap.complete_from = complete_from
-            gap.asked_at, gap.asked = now - ASK_EVERY + GAP_AFTER, gap.asked if sent else ASKED_AT_MOST
+            gap.asked_at = now - ASK_EVERY + (COMES_WITHIN if sent else 0.0)
+            gap.asked = gap.asked if sent else ASKED_AT_MOST
 
     @property
     def _heard(self) -> list[int]:
@@ -212,7 +215,9 @@ class Watch:
             self._alarms.clear("numbers_missing", f"tube {tube}")
             return None
         if known is None or known.numbers[0] != numbers[0]:
-            known = self._gaps[tube] = Gap(numbers, now)
+            # what was given out when the one before was found is missing for as long
+            since = known.found_at if known is not None and numbers[1] <= known.newest else now
+            known = self._gaps[tube] = Gap(numbers, since, self._numbers.newest(tube))
         known.numbers = numbers
         if now >= known.found_at + GAP_AFTER:
             self._alarms.hold("numbers_missing", f"tube {tube}", f"numbers {numbers[0]} to {numbers[1]}")

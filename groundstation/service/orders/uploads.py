@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
+from groundstation.config import GroundConfig
 from telemetry.messages import BlockSegment, BlockStatus
 from telemetry.parameters import ParameterBlock
+from telemetry.transport.authentication import read_key
 from telemetry.transport.upload import Upload, split_block
+
+if TYPE_CHECKING:
+    from telemetry.application.seals import Seals
 
 
 class Uploads:
@@ -55,3 +61,13 @@ class Uploads:
             return False
         del self._running[status.tube]
         return True
+
+
+def uploads_of(config: GroundConfig, seals: Seals | None) -> Uploads | None:
+    """Uploads under the keys of each tube, or under the one key of the rig; None without any."""
+    if seals is not None:
+        return Uploads(seals.block_key_of)
+    if config.key_file is None:
+        return None
+    key = read_key(config.key_file)
+    return Uploads(lambda _tube: key)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 import math
 import secrets
 import time
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
 from groundstation.service.alarms.conditions import conditions_of
-from groundstation.service.alarms.crew_alarms import Condition, Times
+from groundstation.service.alarms.crew_alarms import Condition
 from groundstation.service.alarms.watch import Watch
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.revisions import BEATS
@@ -21,13 +20,13 @@ from groundstation.service.disk.ground_store import Store
 from groundstation.service.disk.keeper import StringKeeper, refusing_disk
 from groundstation.service.hole.blunder_search import RunApart
 from groundstation.service.orders.order_book import SentOrder
-from groundstation.service.orders.uploads import Uploads
+from groundstation.service.orders.uploads import uploads_of
+from groundstation.service.process.doubled_book import DoubledBook
 from groundstation.service.process.intake_tape import DEPTH, MESSAGE, ORDER, TIMER, Tape
 from groundstation.service.process.learner import Learner
 from groundstation.service.process.operator_access import BlockUpload, OperatorAccess, Outgoing
+from groundstation.service.process.station_clock import StationClock
 from groundstation.service.setup.setup_items import shown_marks
-from groundstation.service.setup.told_value import SetupKind, ToldValue
-from groundstation.service.string.doubled_numbers import NumberWatch
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seal_watch import SealWatch, refusal_of
 from telemetry.errors import DecodeError
@@ -49,13 +48,10 @@ from telemetry.messages import (
 from telemetry.presentation.msgpack_codec import decode_message
 from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.process_interface import Process, SentFrames
-from telemetry.runtime.steady_time import SteadyTime
-from telemetry.transport.authentication import read_key
 from telemetry.unwritten import Content
 
 if TYPE_CHECKING:
     from groundstation.service.alarms.certificate_watch import CertificateWatch
-    from telemetry.application.seals import Seals
 
 STARTS = 1 << 31  # numbers of a start by lot
 HEARTBEAT = 1.0  # s, own clock, between two verdicts
@@ -136,11 +132,11 @@ class GroundProcess(Process):
             self._certificates = CertificateWatch(config.keys, model.rig_alarms)
         self.clock: RigClock = self.endpoint.clock
         self.tape = Tape()
-        self._steady, self._told_back, self._date = SteadyTime(), 0.0, date
+        self._time = StationClock(model.rig_alarms, date)
         self.start_number = start
         self.listeners: list[Listener] = []
         self._stale: set[int] = set()
-        self._numbers_watch = NumberWatch()
+        self._doubled = DoubledBook(self.store, model.setup, GROUND_STATION)
         self._early: deque[DepthReading] = deque(maxlen=EARLY)
         self._setup_marks: tuple[object, ...] = ()  # of the setup as it was published
         self._beat_at = -math.inf
@@ -157,7 +153,7 @@ class GroundProcess(Process):
 
     def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
         """A frame arrived from the encoder."""
-        now = self._steady.follow(now)
+        now = self._time.follow(now)
         if now - self._string.time.now > HEARTBEAT:
             self._advance_time(now)  # it stood still: what it knew then must not be shown as of now
         self._send_pending(now)
@@ -170,7 +166,7 @@ class GroundProcess(Process):
 
     def on_depth(self, payload: bytes, now: float) -> None:
         """The rig measured the depth of the bit; bytes that are no reading are counted."""
-        now = self._steady.follow(now)
+        now = self._time.follow(now)
         self._keep_arrived()
         seals = self.endpoint.seals
         content = payload if seals is None else seals.depth_content(payload)
@@ -195,7 +191,7 @@ class GroundProcess(Process):
 
     def on_timer(self, now: float) -> None:
         """Advance to ``now``: orders and uploads, hello, time requests, repetition, and what is wrong by now."""
-        now = self._steady.follow(now)
+        now = self._time.follow(now)
         self._keep_arrived()
         if self.watch.is_due(now) or self._early:
             self._note(TIMER, now)
@@ -215,18 +211,18 @@ class GroundProcess(Process):
         if self.operator.has_pending:
             return now
         due = self._uploads.next_due() if self._uploads is not None else math.inf
-        return self._steady.shown_at(min(super().next_wake(self._steady.follow(now)), due))
+        return self._time.shown_at(min(super().next_wake(self._time.follow(now)), due))
 
     def take_frames(self, now: float) -> SentFrames:
         """Frames to send now."""
-        return super().take_frames(self._steady.follow(now))
+        return super().take_frames(self._time.follow(now))
 
     def bar(self, trouble: str, now: float) -> None:
         """Tell the crew why nothing is taken in from now on, or by an empty text that it is again; nothing is kept."""
         self.operator.barred = trouble
         self.model.rig_alarms.hold("lease", GROUND_STATION, trouble)
-        now = self._steady.follow(now)
-        self.model.crew_alarms.update(self._conditions(), Times(now, self._string.time.rig_now, self._date()))
+        now = self._time.follow(now)
+        self.model.crew_alarms.update(self._conditions(), self._time.times_at(now, self._string.time.rig_now))
         self.model.revisions.on_event()
         self._publish(["alarms", "status", "verdict"])
 
@@ -279,10 +275,7 @@ class GroundProcess(Process):
             self._publish(consequences)
         self.watch.look(now)
         alarms, refusal = self.model.rig_alarms, self.store.refusal
-        if (back := self._steady.back) > self._told_back:
-            what = f"it stepped back by {back - self._told_back:.1f} s; times go on from where they were"
-            alarms.alert("clock_back", "clock", what)
-            self._told_back = back
+        self._time.look()
         alarms.hold("disk", "database", refusal)
         alarms.hold("database", "database", f"{self.store.damaged} messages" if self.store.damaged else "")
         dropped = self.endpoint.dropped
@@ -318,11 +311,9 @@ class GroundProcess(Process):
 
     def _tell_crew(self, now: float) -> None:
         """Follow what is wrong with the alarms that the crew works with, and keep them."""
-        alarms, utc = self.model.crew_alarms, self._date()
-        if back := alarms.follow_date(utc):
-            what = f"the date of its machine is {back:.0f} s before one that was"
-            self.model.rig_alarms.alert("clock_back", "date", what)
-        alarms.update(self._conditions(), Times(now, self._string.time.rig_now, utc))
+        alarms, times = self.model.crew_alarms, self._time.times_at(now, self._string.time.rig_now)
+        self._time.look_at_date(alarms, times.utc)
+        alarms.update(self._conditions(), times)
         if changed := alarms.drain_changed():
             with refusing_disk():
                 self.store.keep_alarms(changed)
@@ -343,13 +334,13 @@ class GroundProcess(Process):
             order = self.operator.command(tube, "resend", {"first": first, "last": last}, by=GROUND_STATION)
         except SelectorError:
             return  # the tube is not known yet; the gap stays
-        order.when_answered(lambda: self._on_resent(order))
+        order.when_answered(lambda: self._on_resent(order, first))
 
-    def _on_resent(self, order: SentOrder) -> None:
+    def _on_resent(self, order: SentOrder, first: int) -> None:
         values = order.values
         if order.done and order.tube is not None:
             sent, complete_from = int(str(values.get("sent", 0))), int(str(values.get("complete_from", 0)))
-            self.watch.on_resent(order.tube, sent, complete_from, self._string.time.now)
+            self.watch.on_resent(order.tube, first, sent, complete_from, self._string.time.now)
 
     def _on_reading(self, reading: DepthReading, now: float) -> None:
         refused = self._string.on_depth(reading, now)
@@ -371,8 +362,7 @@ class GroundProcess(Process):
         self._note(MESSAGE, now, message)
         self._advance_time(now)
         if isinstance(message, NodeState):
-            self._find_doubled(message)
-            message = self._string.doubled.state_apart(message)
+            message = self._doubled.state_apart(message)
         match message:
             case NodeState() if self._string.on_state(message, now):
                 self.model.recalibration.on_state(message)
@@ -391,18 +381,6 @@ class GroundProcess(Process):
                 self.operator.on_block_status(message)
         self.operator.publish_orders()
 
-    def _find_doubled(self, state: NodeState) -> None:
-        """Write down that two tubes give themselves one number, so that it stands until one of them is told."""
-        found, setup = self._numbers_watch.find_places(state), self.model.setup
-        if found is None or (state.tube in setup.doubled and setup.doubled.newest(state.tube).is_same(found)):
-            return
-        values = (float(found.epoch), found.at, float(found.upper), float(found.lower))
-        utc = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
-        entry = ToldValue(setup.next_number(), SetupKind.DOUBLED, str(state.tube), values, 1.0, GROUND_STATION, utc)
-        with refusing_disk():
-            self.store.keep_told(entry)
-        setup.add([entry])
-
     def _keep_arrived(self) -> None:
         """Store and learn what came together before any of it is acknowledged."""
         stored, changed = self._learner.learn_arrived()
@@ -419,13 +397,3 @@ class GroundProcess(Process):
         self.model.revisions.on_published(changed)
         for listener in self.listeners:
             listener(changed)
-
-
-def uploads_of(config: GroundConfig, seals: Seals | None) -> Uploads | None:
-    """Uploads under the keys of each tube, or under the one key of the rig; None without any."""
-    if seals is not None:
-        return Uploads(seals.block_key_of)
-    if config.key_file is None:
-        return None
-    key = read_key(config.key_file)
-    return Uploads(lambda _tube: key)

@@ -224,8 +224,10 @@ class OperatorAccess:
         order.advance(OrderState.DONE)
 
     def tell_setup(self, order: SentOrder) -> None:
-        """Take what is told of the setup, or take it back."""
+        """Take what is told of the setup, or take it back; a bearing taken anew answers the alarm about the encoder."""
         order.advance(OrderState.DONE, self._setup.obey(order))
+        if order.spec.name == "north":
+            self._model.rig_alarms.clear("reference", "encoder")
         self.changed(["setup", "verdict"])
 
     def _follow(self) -> int:

@@ -67,6 +67,11 @@ class MessageNumbers:
                 return gap
         return None
 
+    def newest(self, tube: int) -> int:
+        """The largest number that a tube is known to have given out, in any of its series."""
+        known = self._series.get(tube, {}).values()
+        return max((max(one.told, one.complete, *one.beyond, 0) for one in known), default=0)
+
     def give_up(self, tube: int, gap: Range) -> None:
         """The numbers of a range will never come."""
         series = self._of(tube, gap[0])

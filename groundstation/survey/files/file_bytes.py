@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from groundstation.entry.bounded_text import LARGEST_FILE
 from groundstation.errors import SurveyError
+from telemetry.bounded_bytes import bounded_bytes
 
 MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
 
@@ -20,16 +20,9 @@ def read_file(path: Path) -> bytes:
         When it cannot be read, or is larger than any survey.
     """
     try:
-        if path == Path("-"):
-            content = sys.stdin.buffer.read(LARGEST_FILE + 1)
-        else:
-            with path.open("rb") as file:
-                content = file.read(LARGEST_FILE + 1)
+        return bounded_bytes(sys.stdin.buffer if path == Path("-") else path)
     except OSError as error:
         raise SurveyError(f"{path}: {error.strerror}; expected a file of stations") from error
-    if len(content) > LARGEST_FILE:
-        raise SurveyError(f"{path}: expected a file of at most {LARGEST_FILE // 2**20} MiB, got more")
-    return content
 
 
 def decode_text(path: Path, content: bytes) -> str:

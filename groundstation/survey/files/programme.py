@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.entry.bounded_text import bounded_text
 from groundstation.entry.null_values import is_null
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.well.analysis import Stretch
 from groundstation.survey.well.reference_frames import TieOn
+from telemetry.bounded_bytes import bounded_text
 from telemetry.toml_tables import parse_toml_tables
 
 PLACE = ("md_m", "inclination_deg", "azimuth_deg", "north_m", "east_m", "tvd_m")

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.entry.bounded_text import bounded_text
 from groundstation.entry.null_values import is_null
 from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
 from groundstation.survey.bearings import wrap_azimuth
 from groundstation.survey.well.well_record import SurveyRecord
+from telemetry.bounded_bytes import bounded_text
 
 Array = npt.NDArray[np.float64]
 DISPLACEMENTS = ("md_m", "a_cm", "b_cm")

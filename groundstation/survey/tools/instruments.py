@@ -17,7 +17,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from groundstation.entry.bounded_text import bounded_text
 from groundstation.errors import ToolError
 from groundstation.survey.tools.formulas import (
     CONSTANTS,
@@ -27,6 +26,7 @@ from groundstation.survey.tools.formulas import (
     is_zero,
     normalise_name,
 )
+from telemetry.bounded_bytes import bounded_text
 from telemetry.toml_tables import parse_toml_tables
 
 Triple = tuple[str, str, str]

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.entry.bounded_text import bounded_text
 from groundstation.entry.entry_warning import EntryWarning
 from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
@@ -47,6 +46,7 @@ from groundstation.survey.wall.wall_tables import STRAIGHT, Defaults, read_cours
 from groundstation.survey.well.depth_reference import DEPTHS_FROM
 from groundstation.survey.well.methods import Method
 from groundstation.survey.well.reference_frames import SiteGrid
+from telemetry.bounded_bytes import bounded_text
 from telemetry.toml_tables import parse_toml_tables
 
 if TYPE_CHECKING:

@@ -21,6 +21,7 @@ from node.firmware.edge_interpolation import EDGES
 from node.firmware.encoder_node import EncoderSample
 from node.process.drivers.recorded_imu import RecordedMeans, load_record
 from node.process.drivers.source import ImuSample
+from telemetry.bounded_bytes import LARGEST_LOG, bounded_bytes
 from telemetry.records.record_reading import RecordReading
 
 Rows = npt.NDArray[np.float64]
@@ -126,7 +127,7 @@ def load_rows(path: Path, columns: tuple[int, ...]) -> Rows:
 
 
 def _load_csv(path: Path) -> Rows:
-    lines = [line for line in path.read_text().splitlines() if line.strip()]
+    lines = [line for line in bounded_bytes(path, LARGEST_LOG).decode().splitlines() if line.strip()]
     first = 1 if lines and _is_name(lines[0].split(",")[0]) else 0
     return np.array([[float(cell) for cell in line.split(",")] for line in lines[first:]])
 

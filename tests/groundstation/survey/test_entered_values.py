@@ -333,7 +333,8 @@ def test_a_tie_on_of_no_values_is_refused(tmp_path: Path, text: str, named: str)
         "tube_length", "tube_length_std", "gravity", "north_deg", "north_std_deg", "collar_azimuth_deg",
         "collar_inclination_deg", "collar_std_deg", "mount_tilt_std_deg", "mount_std_deg", "play_std_deg",
         "design_azimuth_deg", "design_inclination_deg", "column_radius", "steering_deg_per_m", "stick_up_m",
-        "accelerometer_bias_std_deg", "north_check_deg",
+        "accelerometer_bias_std_deg", "north_check_deg", "station_tolerance", "stale_after", "depth_rate", "depth_gap",
+        "survey_after",
     ],
 )  # fmt: skip
 def test_a_setting_of_a_ground_station_beyond_its_range_is_refused(tmp_path: Path, key: str, value: float) -> None:
@@ -341,6 +342,27 @@ def test_a_setting_of_a_ground_station_beyond_its_range_is_refused(tmp_path: Pat
         checked_config(folder=tmp_path, **{key: value})
     with pytest.raises(ConfigurationError, match="column_radius"):
         checked_config(folder=tmp_path, column_radius=60.0)
+
+
+@pytest.mark.parametrize(
+    ("key", "what", "low", "high", "unit"),
+    [
+        ("station_tolerance", "a distance of two surveys at one station", 0.001, 1.0, "m"),
+        ("stale_after", "a time of silence", 1.0, 600.0, "s"),
+        ("depth_rate", "a speed of the bit", 0.001, 5.0, "m/s"),
+        ("depth_gap", "a time between two depths", 0.1, 600.0, "s"),
+        ("survey_after", "a time of a stop", 5.0, 3600.0, "s"),
+    ],
+)
+def test_a_setting_of_times_and_speeds_is_refused_by_name_and_unit(
+    tmp_path: Path, key: str, what: str, low: float, high: float, unit: str
+) -> None:
+    for value in (low, high):
+        assert getattr(checked_config(folder=tmp_path, **{key: value}), key) == value
+    for value in (0.999 * low, 1.001 * high, -low):
+        with pytest.raises(ConfigurationError) as refused:
+            checked_config(folder=tmp_path, **{key: value})
+        assert str(refused.value) == f"{key}: expected {what} of {low:g}..{high:g} {unit}, got {value!r}"
 
 
 def test_a_place_is_in_radians() -> None:

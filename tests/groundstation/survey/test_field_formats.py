@@ -9,7 +9,8 @@ import pytest
 from same_well import FORMATS, ROWS, ags, bomb, csv_text, diggs, las_2, las_3, witsml_1, witsml_2, xlsx
 
 from groundstation.calibration.calibration_records import read_turn_table
-from groundstation.entry import bounded_text
+from groundstation.calibration.matrix_files import read_matrix
+from groundstation.calibration.mwd_block import read_triad
 from groundstation.errors import SurveyError
 from groundstation.plan_settings import read_plan
 from groundstation.survey.files.field_files import read_any
@@ -20,7 +21,11 @@ from groundstation.survey.requests.survey_answer import answer_survey
 from groundstation.survey.requests.survey_request import FrameRequest, SurveyRequest
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.wall.wall_file import read_wall
-from telemetry.errors import InputError
+from sim.world.parsing import read_toml
+from telemetry.bounded_bytes import LARGEST_FILE
+from telemetry.calibration import read_calibration
+from telemetry.errors import BorechainError
+from telemetry.records.noise_file import read_gyro_noise
 
 
 def put(folder: Path, name: str, content: bytes | str) -> Path:
@@ -171,7 +176,9 @@ def test_entities_and_document_types_are_refused(tmp_path: Path, doctype: str, e
     [
         ("plan.toml", read_plan), ("wall.toml", read_wall), ("tie.toml", read_tie_on), ("legs.toml", read_programme),
         ("s.csv", read_record), ("plan.csv", read_plan), ("table.csv", lambda path: read_turn_table(path, 1.0)),
-        ("tool.toml", lambda path: load_tool(str(path))),
+        ("tool.toml", lambda path: load_tool(str(path))), ("block.json", read_calibration),
+        ("matrix.toml", lambda path: read_matrix(path, 1.0)), ("noise.json", read_gyro_noise),
+        ("hole.toml", read_toml), ("triad.json", lambda path: read_triad(path, "accelerometer")),
     ],
 )  # fmt: skip
 def test_settings_of_two_gigabytes_are_refused_before_they_are_read_whole(
@@ -182,7 +189,7 @@ def test_settings_of_two_gigabytes_are_refused_before_they_are_read_whole(
         file.truncate(2 * 2**30)
     tracemalloc.start()
     try:
-        with pytest.raises(InputError, match="64 MiB"):
+        with pytest.raises(BorechainError, match="a file larger than 64 MiB"):
             read(path)
         assert tracemalloc.get_traced_memory()[1] < 300 * 2**20
     finally:
@@ -193,11 +200,11 @@ def test_a_file_beyond_any_survey_is_refused_before_it_is_read_whole(tmp_path: P
     path = tmp_path / "large.csv"
     with path.open("wb") as file:
         file.truncate(2 * 2**30)  # a hole of 2 GB
-    with pytest.raises(SurveyError, match="expected a file of at most 64 MiB, got more"):
+    with pytest.raises(SurveyError, match=r"large\.csv: a file larger than 64 MiB; expected a file of stations"):
         read_any(path)
     with pytest.raises(SurveyError, match="a workbook of at most 256 MiB, got more"):
         read_any(put(tmp_path, "bomb.xlsx", bomb()))
-    assert bounded_text.LARGEST_FILE < 2 * 2**30
+    assert LARGEST_FILE < 2 * 2**30
 
 
 def test_a_wall_reads_what_a_survey_reads(tmp_path: Path) -> None:
