@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import random
 import threading
 from collections.abc import Iterator
 
@@ -124,9 +125,14 @@ def state_of(tube: int, hops: int, now: float) -> NodeState:
 
 
 def survey_of(tube: int, number: int, now: float, hops: int) -> SurveyMeasurement:
-    """Survey of a tube in a hole that leans a little to the north."""
+    """Survey of a tube in a hole that leans a little to the north, with a noise that its tube and number draw.
+
+    It is half of what is stated of it: so nothing is ever looked for that might be wrong.
+    """
     noise = ((SURVEY_VAR, 0.0, 0.0), (0.0, SURVEY_VAR, 0.0), (0.0, 0.0, SURVEY_VAR))
-    imus = (ImuMean((9.81 * math.sin(LEAN), 0.0, -9.81 * math.cos(LEAN)), noise),)
+    draw = random.Random(tube << 32 | number)
+    north, east, along = (0.5 * math.sqrt(SURVEY_VAR) * draw.gauss(0.0, 1.0) for _ in range(3))
+    imus = (ImuMean((9.81 * math.sin(LEAN) + north, east, along - 9.81 * math.cos(LEAN)), noise),)
     return SurveyMeasurement(tube, number, now, hops, imus, 0.0, 1e-8, 1e-8, 32, 5.0, NodeFlag.NONE)
 
 

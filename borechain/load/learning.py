@@ -34,7 +34,13 @@ SHORTLY_S = 0.01  # until the next reading
 COURSES = 3  # stops at one depth
 TENTH = 10
 QUESTIONS = 5  # after a survey
-START_S, LEARN_MS, ANSWER_MS = 2.0, 1.0, 20.0  # at most
+START_S, LEARN_MS, ANSWER_MS, FEW_MS = 2.0, 1.0, 20.0, 5.0  # at most
+STARTED, AGAIN = "start upon what another one wrote", "start again"
+TOGETHER, ALONE, ARRIVAL = "learning each of a stop", "learning one alone", "arrival: working out the hole"
+FEW = 10  # tubes, and stations of as many stops
+FEW_ARRIVAL = f"arrival at {FEW} tubes and {FEW} stations"
+HOLES = 5  # so small, each drawn anew
+BOUNDS = {STARTED: START_S, AGAIN: START_S, TOGETHER: LEARN_MS, ALONE: LEARN_MS, FEW_ARRIVAL: FEW_MS}
 ASKED = (
     "status", "verdict", "string", "nodes/1", "stations", "stations/1", "stations/1/measurements", "trajectory",
     "uncertainty", "column", "history", "events", "alarms", "measurements", "changes", "adjustment", "setup",
@@ -72,13 +78,13 @@ class LearningLoad:
     """
 
     def __init__(self, config: GroundConfig, tubes: int, begin: float) -> None:
-        self._tubes = tubes
+        self._config, self._tubes = config, tubes
         self._now = begin
         self._clock = TapeClock(begin, EPOCH)
         self._source = DepthSource()
         self._questions = itertools.cycle(ASKED)
         self.taken: dict[str, list[float]] = defaultdict(list)  # s of CPU
-        with self._timing("start"):
+        with self._timing(STARTED):
             self.ground = start_ground_process(config)
         self.ground.clock = self._clock
 
@@ -96,14 +102,14 @@ class LearningLoad:
         before = time.process_time()
         self._take(surveys, md)
         self.ground.model.hole.settle()
-        self.taken["learning each of a stop"].append((time.process_time() - before) / len(surveys))
+        self.taken[TOGETHER].append((time.process_time() - before) / len(surveys))
 
     def learn_alone(self, surveys: list[SurveyMeasurement], md: float) -> None:
         """Take each survey by itself and compute the hole after it, as the next look or question does."""
         for survey in surveys:
-            with self._timing("learning one alone"):
+            with self._timing(ALONE):
                 self._take([survey], md)
-            with self._timing("working out the hole then"):
+            with self._timing(ARRIVAL):
                 self.ground.model.hole.settle()
 
     def place_alone(self, survey: SurveyMeasurement, md: float) -> None:
@@ -112,9 +118,11 @@ class LearningLoad:
         self.ground.model.hole.settle()
 
     def learn_asked(self, surveys: list[SurveyMeasurement], md: float) -> None:
-        """Take surveys one by one with a query after each; the first query waits for the computed hole."""
+        """Take surveys one by one with a look and queries after each; what a query shows is not kept from before."""
         for survey in surveys:
             self._take([survey], md)
+            with self._timing(ARRIVAL):
+                self.ground.model.hole.settle()
             for path in itertools.islice(self._questions, QUESTIONS):
                 with self._timing(path):
                     self.ground.operator.ask_json(path)
@@ -122,8 +130,14 @@ class LearningLoad:
     def ask_first(self) -> None:
         """Ask for each path for the first time, when no answer is cached."""
         for path in ASKED:
-            with self._timing("the first answer of each"):
+            with self._timing(f"{path}, the first time"):
                 self.ground.operator.ask_json(path)
+
+    def start_again(self) -> None:
+        """Close it, and start another upon what it has kept."""
+        self.ground.close()
+        with self._timing(AGAIN):
+            start_ground_process(self._config).close()
 
     def _take(self, surveys: list[SurveyMeasurement], md: float) -> None:
         """Take surveys: they are stored, and placed by the next reading of the depth."""
@@ -172,12 +186,32 @@ def measure_learning(surveys: int, tubes: int, stops: int, folder: Path) -> dict
         if hole.newest != before + learnt:
             raise RigError(f"{learnt} surveys came, {hole.newest - before} were fused")
         stations = len(hole.stations)
+        hearing.start_again()
+    hearing.taken[FEW_ARRIVAL] = [one for n in range(HOLES) for one in arrivals_of_few(folder / f"few-{n}", n)]
     return {
         "surveys": before + learnt,
         "stations": stations,
         "store_bytes_of_a_survey": {"of a tenth": sizes[0], "of all": sizes[1]},
         "figures": [timing_figure(what, taken).row for what, taken in hearing.taken.items()],
     }
+
+
+def arrivals_of_few(folder: Path, hole: int) -> list[float]:
+    """Seconds of CPU of each arrival of the last stop of a small hole, that a string of few tubes has drilled."""
+    config = checked_config(rig=RIG, folder=folder, tube_length=TUBE_LENGTH, target=2.0 * TUBE_LENGTH * FEW)
+    write_day(config.url, 0, FEW)  # the order of its tubes alone
+    load = LearningLoad(config, FEW, BEGUN_AT)
+    advances = round(TUBE_LENGTH / ADVANCE)
+    with contextlib.closing(load.ground):
+        for stop in range(1, FEW + 1):
+            for part in range(1, advances + 1):
+                md = TUBE_LENGTH * (stop - 1) + ADVANCE * part
+                taken = load.drill(FEW * hole + stop, md)
+            learn = load.learn_alone if stop == FEW else load.learn_together
+            learn(taken, md)
+        if load.ground.model.hole.newest != FEW * (FEW + 1) // 2:
+            raise RigError(f"{load.ground.model.hole.newest} surveys of {FEW} tubes at {FEW} stops were fused")
+    return load.taken[ARRIVAL]
 
 
 def bytes_of_a_survey(config: GroundConfig, stops: int, tubes: int) -> float:
@@ -188,7 +222,7 @@ def bytes_of_a_survey(config: GroundConfig, stops: int, tubes: int) -> float:
 
 def timing_figure(what: str, taken: list[float]) -> Figure:
     """The row of what was timed."""
-    unit, scale, bound = ("s", 1.0, START_S) if what == "start" else ("ms", 1e3, ANSWER_MS)
-    bound = LEARN_MS if what.startswith("learning") else bound
+    unit, scale = ("s", 1.0) if what in (STARTED, AGAIN) else ("ms", 1e3)
+    bound = BOUNDS.get(what, ANSWER_MS)
     p50, p99 = (scale * float(value) for value in np.percentile(taken, (50.0, 99.0)))
     return Figure(what, unit, p50, p99, scale * max(taken), len(taken), bound)

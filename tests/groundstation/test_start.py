@@ -8,7 +8,19 @@ import pytest
 
 from borechain.load.crowd import ROUND_S
 from borechain.load.day import ADVANCES, BEGUN_AT, depth_of, write_day
-from borechain.load.learning import ASKED, LearningLoad, measure_learning
+from borechain.load.learning import (
+    AGAIN,
+    ALONE,
+    ARRIVAL,
+    ASKED,
+    FEW,
+    FEW_ARRIVAL,
+    HOLES,
+    STARTED,
+    TOGETHER,
+    LearningLoad,
+    measure_learning,
+)
 from groundstation.config import GroundConfig
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.paths import find_path
@@ -51,13 +63,14 @@ def test_a_start_knows_to_the_last_byte_what_was_known_before_it(tmp_path: Path)
 def test_the_bench_asks_for_every_key_and_says_what_misses_its_bound(tmp_path: Path) -> None:
     result = measure_learning(200, 5, 3, tmp_path)
     figures = {row["what"]: row for row in result["figures"]}
-    learnt = {"learning each of a stop", "learning one alone", "working out the hole then"}
-    assert set(figures) == {"start", "the first answer of each", *learnt, *ASKED}
+    first = {f"{path}, the first time" for path in ASKED}
+    assert set(figures) == {STARTED, AGAIN, TOGETHER, ALONE, ARRIVAL, FEW_ARRIVAL, *first, *ASKED}
     in_the_hole = [
         math.ceil((2.0 + 0.25 * (stop * 32 // 40)) / 2.0) for stop in range(40)
     ]  # tubes of 2 m, at each stop
     assert result["surveys"] == sum(in_the_hole) + 3 * 5
     assert all(0.0 < row["p50"] <= row["p99"] <= row["max"] for row in figures.values())
     assert all(row["holds"] == (row["p99"] <= row["bound"]) for row in figures.values())
-    assert figures["start"]["unit"] == "s"
-    assert (figures["learning one alone"]["count"], figures["learning each of a stop"]["count"]) == (5, 1)
+    assert all((figures[what]["unit"], figures[what]["bound"]) == ("s", 2.0) for what in (STARTED, AGAIN))
+    assert (figures[ALONE]["count"], figures[TOGETHER]["count"], figures[ARRIVAL]["count"]) == (5, 1, 2 * 5)
+    assert (figures[FEW_ARRIVAL]["count"], figures[FEW_ARRIVAL]["bound"]) == (FEW * HOLES, 5.0)

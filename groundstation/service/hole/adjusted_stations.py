@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -24,6 +25,8 @@ from groundstation.survey.path.leg_wander import CollarTie, LegWander
 from groundstation.survey.well.trajectory import TURNED_BACK
 
 Array = npt.NDArray[np.float64]
+SURELY_ON = math.radians(60.0)  # between any two surveys of two stations, up to which the lower points on
+TINY = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,13 +54,39 @@ class AdjustedStations:
 
     def turned_back(self) -> list[float]:
         """Depths (m) of stations whose surveys point back against those of the one above."""
-        grown = [station for station in self.below if station.lacks_newest]
-        if grown and self.stops is not None:
-            SurveyStation.fuse_together(grown, self.stops)
         above = self.collar if self.told is None else self.told
-        tangents = tangents_of([above, *map(fused_alone, self.below)])
-        back = np.flatnonzero((tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK)
-        return [self.below[place].md for place in back.tolist()]
+        tangent = tangents_of([above])[0]
+        suspected = may_turn_back(tangent, self.below, self.stops) if self.stops is not None else range(len(self.below))
+        found = []
+        for place in suspected:
+            pair = [fused_alone(self.below[place - 1]) if place else above, fused_alone(self.below[place])]
+            upper, lower = tangents_of(pair)
+            if float(upper @ lower) < TURNED_BACK:
+                found.append(self.below[place].md)
+        return found
+
+
+def may_turn_back(above: Array, below: Sequence[SurveyStation], stops: ResolvedStops) -> list[int]:
+    """Places of the stations that may point back against the one above, the first against a direction (3,).
+
+    What a station comes to lies among its surveys, or not far from them, and those of a hole that is one lie within
+    a few degrees: so hardly any station has to be worked out by itself.
+    """
+    if not below:
+        return []
+    rows, begins = array("I"), list[int]()
+    for one in below:
+        begins.append(len(rows))
+        rows += one.stops.rows[one.first :]
+    tangents = stops.rows["tangent"][np.array(rows)]
+    means = np.add.reduceat(tangents, begins, axis=0)
+    means /= np.maximum(np.linalg.norm(means, axis=1, keepdims=True), TINY)
+    counts = np.diff([*begins, len(rows)])
+    within = np.minimum.reduceat(np.sum(tangents * means.repeat(counts, axis=0), axis=1), begins)
+    spread = np.arccos(np.clip(np.append(1.0, within), -1.0, 1.0))
+    centres = np.concatenate([above[None], means])
+    bend = np.arccos(np.clip(np.sum(centres[1:] * centres[:-1], axis=1), -1.0, 1.0))
+    return np.flatnonzero(bend + spread[1:] + spread[:-1] > SURELY_ON).tolist()
 
 
 def adjusted_stations(

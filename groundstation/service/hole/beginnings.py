@@ -16,12 +16,11 @@ import numpy.typing as npt
 from groundstation.service.hole.blunder_search import LookedAt
 from groundstation.service.hole.hung_chains import HungChains
 from groundstation.service.hole.resolved_stops import Rows
-from groundstation.survey.adjustment.adjust import adjust_hole
+from groundstation.survey.adjustment.adjust import MANY, adjust_hole
 from groundstation.survey.adjustment.looks import OF_TUBE, TURN, PathPrior, StartingPoint, StringPrior
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
-MANY = 1500  # looks, from which on an adjustment begins where an earlier one ended
 EVERY = (16, 4)  # stops of the string between such beginnings
 LookAt = Callable[[Rows, Array, Places, PathPrior, HungChains], LookedAt]
 

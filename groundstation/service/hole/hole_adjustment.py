@@ -92,10 +92,11 @@ class HoleAdjustment:
         """
         table = stops.rows[: len(stops)]
         below = np.flatnonzero(station_of_row > 0)
-        rows = below[np.lexsort((table["tube"][below], table["at"][below]))]
+        rows = below[order_in_time(table["tube"][below], table["at"][below])]
         if not len(rows):
             return None
-        path, of_stops = self.path_of(mds, collar), table[rows]
+        # mostly they came in that order, and rows are wide
+        path, of_stops = self.path_of(mds, collar), table if are_all(rows, len(table)) else table[rows]
         forces = stops.mean_forces(rows)
         seen = self._looked_at(of_stops, forces, station_of_row[rows], path, self._chains)
         seen = replace(seen, start=self._beginnings.start_of(rows, of_stops, seen))
@@ -132,6 +133,19 @@ class HoleAdjustment:
             math.radians(self._config.curvature_std_deg_per_m),
             self._config.curvature_length,
         )
+
+
+def order_in_time(tubes: npt.NDArray[np.uint32], at: Array) -> Places:
+    """Order (n,) of looks in time (s), and of those at one time by their tubes."""
+    later = np.diff(at)
+    if np.all((later > 0.0) | ((later == 0.0) & (tubes[1:] >= tubes[:-1]))):
+        return np.arange(len(at))
+    return np.lexsort((tubes, at))
+
+
+def are_all(rows: Places, count: int) -> bool:
+    """Whether rows are all of ``count``, in their order."""
+    return len(rows) == count and bool(np.all(np.diff(rows, prepend=-1) == 1))
 
 
 def number_values(values: npt.NDArray[np.uint32]) -> tuple[list[int], Places]:

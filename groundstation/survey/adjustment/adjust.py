@@ -20,11 +20,16 @@ from groundstation.survey.adjustment.curvature_size import learnt_curvature
 from groundstation.survey.adjustment.equations import (
     Equations,
     path_equations,
+    path_right_sides,
     string_departure,
     string_information,
 )
-from groundstation.survey.adjustment.kernels.observations import add_looks, linearise_looks
-from groundstation.survey.adjustment.kernels.path_elimination import eliminate_path, substitute_path
+from groundstation.survey.adjustment.kernels.observations import add_looks, add_right_sides, linearise_looks
+from groundstation.survey.adjustment.kernels.path_elimination import (
+    eliminate_path,
+    reduce_right,
+    substitute_path,
+)
 from groundstation.survey.adjustment.linear_solution import InCommon, LinearSolution
 from groundstation.survey.adjustment.looks import OF_TUBE, FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
 from groundstation.survey.adjustment.play import PLAY_KNOWN_AS, faster_play, learnt_play
@@ -42,6 +47,8 @@ LEGS_SETTLED = 0.2  # of the logarithm of the variance of each leg
 POOR_YAW = 0.05  # rad, standard deviation, from which on a direction goes about the vertical rather than straight
 PART = 0.75  # of the way that variances of legs go at once
 TURNED_BACK = 0.5  # of that, whenever they turn back by more than half of what they were to go
+MANY = 1500  # looks, from which on later steps go by the equations of the first, whose right sides alone are made anew
+NEARER = 0.5  # of the step before it, up to which such a step leads on
 GROSS = 16.27  # chi-square of three beyond which a look counts less: one in a thousand
 
 
@@ -88,18 +95,23 @@ def adjust_hole(
     known, is_learnt = string_information(string, extra), now.is_learnt
     is_settled = is_learnt  # where it begins: so what is known of each unknown beside the others is no matter
     turns = poor_yaws(looks, len(path.md))
+    is_many, is_near, step = len(looks) >= MANY, False, np.inf  # near: the equations of before lead on
     is_bent, tried, swing = is_learnt, list[tuple[float, float]](), Swing()
     for again in range(ITERATIONS + FURTHER):
         bases = carried_bases(now.tangents)
         linear = linearise_all(looks, now, bases, extra)
-        solution = solve_equations(
-            looks, linear, path_equations(path, now, bases), known, string_departure(string, now), extra
-        )
-        step = solution.decrement if is_settled else solution.step
+        departure = string_departure(string, now)
+        if is_near:
+            right_sides = path_right_sides(path, now, bases)
+            solution = solve_again(found.solution, looks, linear, right_sides, -known @ departure, extra)
+        else:
+            solution = solve_equations(looks, linear, path_equations(path, now, bases), known, departure, extra)
+        before, step = step, solution.decrement if is_settled else solution.step
         if not np.isfinite(step):
             raise np.linalg.LinAlgError("expected a step of the unknowns, got numbers that are none")
         now = _stepped(now, bases, solution, turns)
         found = Adjusted(looks, string, path, extra, now, linear, solution, known)
+        is_near = is_settled and is_many and step < NEARER * before
         if not is_learnt:
             play = learnt_play(found, string.play_std**2, PLAY_KNOWN_AS)
             if again and not is_bent:  # the first step was not along the sphere
@@ -157,6 +169,33 @@ def solve_equations(
     return LinearSolution(
         diagonal, tied, coupled[:, :, :size], left, states[:, :, 0], gain, equations.at_station, whole
     )
+
+
+def solve_again(
+    known: LinearSolution, looks: Looks, linear: Linearised, of_path: Array, of_string: Array, extra: FurtherEffects
+) -> LinearSolution:
+    """Solve the equations of an earlier step, with right sides as the unknowns stand now.
+
+    A step by them leads to the same place as one by equations that are made anew, for there the right sides vanish.
+    Source: the simplified Newton method, Deuflhard, "Newton Methods for Nonlinear Problems", Springer (2004), 2.1.
+
+    Parameters
+    ----------
+    known : from ``solve_equations``, or from here
+    of_path, of_string : (s + 1, 4) and (p,), right sides of what is known before; the looks are added
+    """
+    right, of_common = of_path.copy(), of_string.copy()
+    add_right_sides(
+        looks.station, looks.tube, looks.make_up, linear.jacobians, linear.weights, linear.residuals, extra.columns,
+        linear.gravity_at, right, of_common,
+    )  # fmt: skip
+    own = right[:, :, None]
+    reduce_right(known.diagonal, known.tied, own)
+    flat = known.coupled.reshape(-1, len(of_common))
+    left = known.in_common.with_right(of_common - flat.T @ right.ravel())
+    states = (right - known.coupled @ left.step)[:, :, None].copy()
+    substitute_path(known.diagonal, known.tied, states)
+    return replace(known, in_common=left, states=states[:, :, 0], of_path=float(np.sum(right * right)))
 
 
 def gather_equations(

@@ -44,25 +44,36 @@ class Equations:
 def path_equations(path: PathPrior, start: StartingPoint, bases: Array) -> tuple[Array, Array, Array]:
     """Blocks (s + 1, 4, 4), ties to the station above (s + 1, 4, 4) and right sides (s + 1, 4) of the path alone."""
     count = len(path.md)
-    diagonal, tied, right = np.zeros((count, STATE, STATE)), np.zeros((count, STATE, STATE)), np.zeros((count, STATE))
-    collar = np.linalg.inv(bases[0] @ path.collar_cov @ bases[0].T + KNOWN * np.eye(2))
-    off = bends_between(np.stack([start.tangents[0], path.collar]), bases[:1].repeat(2, axis=0))[0]
-    diagonal[0, :2, :2] += collar
-    right[0, :2] += collar @ off
-    rigid = 1.0 / start.curvature_var
-    diagonal[0, 2:, 2:] += rigid * np.eye(2)
-    right[0, 2:] -= rigid * start.curvatures[0]
+    diagonal, tied = np.zeros((count, STATE, STATE)), np.zeros((count, STATE, STATE))
+    diagonal[0, :2, :2] += known_collar(path, bases)
+    diagonal[0, 2:, 2:] += 1.0 / start.curvature_var * np.eye(2)
     if count > 1:
         go, rigid_legs = leg_steps(path)
         weight = rigid_legs / start.leg_vars[:, None, None]
-        pull = np.einsum("kab,kb->ka", weight, path_departures(path, start, bases, go))
-        back = np.swapaxes(go, 1, 2)
         diagonal[1:] += weight
-        diagonal[:-1] += back @ weight @ go
+        diagonal[:-1] += np.swapaxes(go, 1, 2) @ weight @ go
         tied[1:] = -weight @ go
+    return diagonal, tied, path_right_sides(path, start, bases)
+
+
+def known_collar(path: PathPrior, bases: Array) -> Array:
+    """Information (2, 2) on the direction at the collar before any look."""
+    return np.asarray(np.linalg.inv(bases[0] @ path.collar_cov @ bases[0].T + KNOWN * np.eye(2)), np.float64)
+
+
+def path_right_sides(path: PathPrior, start: StartingPoint, bases: Array) -> Array:
+    """Right sides (s + 1, 4) of the path alone."""
+    right = np.zeros((len(path.md), STATE))
+    off = bends_between(np.stack([start.tangents[0], path.collar]), bases[:1].repeat(2, axis=0))[0]
+    right[0, :2] += known_collar(path, bases) @ off
+    right[0, 2:] -= 1.0 / start.curvature_var * start.curvatures[0]
+    if len(right) > 1:
+        go, rigid_legs = leg_steps(path)
+        weight = rigid_legs / start.leg_vars[:, None, None]
+        pull = np.einsum("kab,kb->ka", weight, path_departures(path, start, bases, go))
         right[1:] -= pull
-        right[:-1] += np.einsum("kab,kb->ka", back, pull)
-    return diagonal, tied, right
+        right[:-1] += np.einsum("kab,kb->ka", np.swapaxes(go, 1, 2), pull)
+    return right
 
 
 def leg_steps(path: PathPrior) -> tuple[Array, Array]:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+KEPT = ("factor", "cov", "root")  # of equations, whatever stands on their right side
 WIDE = 150  # unknowns, from which on Cholesky's factor is worth its calls: it takes half of what a general inverse does
 
 
@@ -51,6 +52,21 @@ class InCommon:
 
         lower = np.tril(lapack.dpotri(self.factor, lower=1)[0])
         return np.asarray(lower + np.tril(lower, -1).T)
+
+    @cached_property
+    def root(self) -> Array:
+        """Root R (p, p) of the covariance R R^T: lower triangular, or of many unknowns upper triangular."""
+        if len(self.right) < WIDE:
+            return np.asarray(np.linalg.cholesky(self.cov))
+        from scipy.linalg import lapack
+
+        return np.triu(lapack.dtrtri(self.factor, lower=1)[0].T)
+
+    def with_right(self, right: Array) -> InCommon:
+        """The same equations with another right side; what was worked out of them is known."""
+        made = InCommon(self.information, right)
+        made.__dict__.update({name: self.__dict__[name] for name in KEPT if name in self.__dict__})
+        return made
 
     @cached_property
     def step(self) -> Array:

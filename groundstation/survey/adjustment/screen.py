@@ -53,7 +53,7 @@ def against_prior(found: Adjusted) -> tuple[Array, Places]:
     before = np.ones(width)
     before[: stds.size], before[stds.size] = stds.ravel() ** 2, string.gravity_std**2
     before[turn_places(string)] = np.diag(string.turn_cov)
-    free = before - np.diag(found.common_cov)[:width]
+    free = before - found.common_vars[:width]
     is_told = free > LEAST_TOLD * before
     return np.where(is_told, off * off / np.where(is_told, free, 1.0), 0.0), is_told.astype(np.intp)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.survey.adjustment.kernels.carried_bases import carry_bases
 from groundstation.survey.adjustment.kernels.free_parts import free_parts
-from groundstation.survey.adjustment.kernels.observations import add_looks, linearise_looks
+from groundstation.survey.adjustment.kernels.observations import add_looks, add_right_sides, linearise_looks
 from groundstation.survey.adjustment.kernels.path_elimination import (
     eliminate_path,
     path_covariances,
@@ -34,6 +34,9 @@ def warm_adjustment() -> None:
     add_looks(
         first, first, first, jacobians, weights, residuals, extra, 6, np.zeros((1, 2, 2)), np.zeros((1, 2, width + 1)),
         common,
+    )  # fmt: skip
+    add_right_sides(
+        first, first, first, jacobians, weights, residuals, extra, 6, np.zeros((1, 4)), np.zeros(width),
     )  # fmt: skip
     diagonal, tied, coupled = np.eye(4)[None].copy(), np.zeros((1, 4, 4)), np.zeros((1, 4, width + 1))
     eliminate_path(diagonal, tied, coupled)

@@ -160,3 +160,34 @@ def add_looks(
             for b in range(width + 1):
                 total = rows[0, a] * weighed[0, b] + rows[1, a] * weighed[1, b] + rows[2, a] * weighed[2, b]
                 in_common[at[a], at[b]] += total
+
+
+@allocating_kernel
+def add_right_sides(
+    station: Places, tube: Places, make_up: Places, jacobians: Array, weights: Array, residuals: Array, extra: Array,
+    gravity_at: int, of_direction: Array, of_common: Array,
+) -> None:  # fmt: skip
+    """Add the looks to the right sides of the normal equations alone, see ``add_looks``.
+
+    Parameters
+    ----------
+    of_direction, of_common : (s + 1, 2 or more) and (p,), added to
+    """
+    count, size = extra.shape[2], len(of_common)
+    pulled = np.empty(3)
+    for k in range(len(station)):
+        j, w, r = jacobians[k], weights[k], residuals[k]
+        for i in range(3):
+            pulled[i] = w[i, 0] * r[0] + w[i, 1] * r[1] + w[i, 2] * r[2]
+        for a in range(2):
+            of_direction[station[k], a] += j[0, a] * pulled[0] + j[1, a] * pulled[1] + j[2, a] * pulled[2]
+        for a in range(6):
+            total = j[0, 2 + a] * pulled[0] + j[1, 2 + a] * pulled[1] + j[2, 2 + a] * pulled[2]
+            of_common[6 * tube[k] + a] += total
+            if a == 5:
+                of_common[gravity_at + 1 + make_up[k]] += total
+        of_common[gravity_at] += j[0, 8] * pulled[0] + j[1, 8] * pulled[1] + j[2, 8] * pulled[2]
+        for a in range(count):
+            of_common[size - count + a] += (
+                extra[k, 0, a] * pulled[0] + extra[k, 1, a] * pulled[1] + extra[k, 2, a] * pulled[2]
+            )
