@@ -255,6 +255,13 @@ EVENT_TABLE: Final[dict[Code, EventSpec]] = {
         "the string turned below a head at rest: it ran on, unwinds or creeps; the yaw's variance says so",
         (("sigmas", float), ("turned_deg", float)),
     ),
+    Code.ENCODER_RATIO: EventSpec(
+        "encoder_ratio",
+        Severity.ERROR,
+        "encoder and gyroscope turn in a constant ratio that is not one: another number of lines, or a wrong scale; "
+        "nothing is known of the yaw until the node starts as new",
+        (("ratio", float),),
+    ),
 }
 
 

@@ -71,6 +71,8 @@ class NodeReporter:
             bits |= SENSOR_FAULT | YAW_UNTRUSTED
         if guard["force"]["fault"]:
             bits |= SENSOR_FAULT
+        if guard["ratio"]["told"]:
+            bits |= YAW_UNTRUSTED
         return bits
 
     @property

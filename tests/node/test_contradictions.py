@@ -16,7 +16,7 @@ from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.process.drivers.mpu_imu import MpuImu
 from node.process.tube_process import TubeProcess
 from sim.string import head_measurements
-from telemetry.messages import Event, Severity
+from telemetry.messages import Event, NodeFlag, Severity
 
 
 class Told(TubeProcess):
@@ -77,3 +77,11 @@ def test_an_encoder_of_another_resolution_is_named_while_the_head_first_turns(
     assert "aiding_rejected" in one.codes(begun)
     assert np.all(np.isfinite(one.std))
     assert math.isfinite(one.states[-1].yaw)
+    ratios = [event.arguments["ratio"] for _, event in one.events if event.code == "encoder_ratio"]
+    assert ratios == pytest.approx([counts / 4096.0], rel=0.01)
+    flags = NodeFlag.YAW_UNTRUSTED | NodeFlag.INNOVATION_REJECTED
+    told = np.array([bool(state.flags & flags) for state in one.states])
+    var = one.std**2 + one.string.run.systematic_var[:, 0]
+    lies = [k for k in range(begun, one.cycles) if one.error[k] ** 2 > 9.0 * var[k] and not told[k : k + 11].any()]
+    assert not lies, "no yaw is wrong without a flag or a sigma"
+    assert one.states[-1].systematic_var > 3.0, "a rest does not tell how far the head turned"

@@ -39,7 +39,7 @@ class Resting:
             self.state["P"][3 + k, 3 + k] = KNOWN**2
         self.cycle(np.zeros(3), 0.0, resting=False)
 
-    def cycle(self, rate: Array, turn: float, resting: bool = True, noise: float = 0.0) -> None:
+    def cycle(self, rate: Array, turn: float, resting: bool = True, noise: float = 0.0, sideways: float = 0.0) -> None:
         """One cycle at mean rates (3, rad/s) in which the tube turns by an angle (rad)."""
         k, state, guard = self.cycles, self.state, self.node["guard"]
         self.turned += 0.5 * turn
@@ -47,7 +47,7 @@ class Resting:
         state["ring_rate"][k % RING] = rate
         state["ring_force"][k % RING] = (
             -across * math.cos(self.turned) + noise,
-            across * math.sin(self.turned),
+            across * math.sin(self.turned) + sideways,
             -G * math.cos(self.lean),
         )
         self.turned += 0.5 * turn
@@ -109,11 +109,58 @@ def test_a_rest_too_short_to_be_looked_at_takes_no_doubt_back() -> None:
     assert resting.doubt_deg == pytest.approx(0.1, rel=0.05)
 
 
+@pytest.mark.parametrize("angle_deg", [0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.2])
+@pytest.mark.parametrize("within_s", [1.0, 3.0])
+def test_what_is_in_doubt_covers_the_turn_and_is_no_more_than_it(angle_deg: float, within_s: float) -> None:
+    """Over the first ten cycles the noise of a healthy gyroscope is 0.02 deg at most: three times that is in doubt."""
+    doubt = Resting().rest(run_on(angle_deg, within_s)[:10]).doubt_deg
+    assert doubt == 0.0 or angle_deg / 3.0 < doubt < 1.05 * angle_deg
+    assert doubt > 0.0 or angle_deg < 0.07
+
+
+def test_the_doubt_grows_with_the_turn() -> None:
+    doubts = [Resting().rest(run_on(angle, 2.0)[:10]).doubt_deg for angle in np.linspace(0.02, 0.15, 27)]
+    assert doubts == sorted(doubts)
+    assert 0.0 < doubts[8] < 0.7 * 0.06, "0.06 deg is some four sigmas: by its chance"
+
+
+@pytest.mark.parametrize(("lean_deg", "seen"), [(2.0, False), (20.0, True), (30.0, True), (60.0, True)])
+def test_gravity_shows_a_turn_that_the_gyroscope_takes_for_a_bias(lean_deg: float, seen: bool) -> None:
+    """At 0.006 deg/s, as a bias may wander, where half of a sample's tilt over the lean's sine is 0.03 deg at most."""
+    resting = Resting(lean_deg).rest(np.full(CYCLES, 0.0), turned_dps=0.006)
+    crept = 0.006 * CYCLES * PERIOD
+    assert resting.doubt_deg == (pytest.approx(crept, rel=0.15) if seen else 0.0)
+    assert not resting.codes, "variance, and no event"
+
+
+def test_an_honest_rest_of_a_tube_that_leans_is_hardly_ever_in_doubt() -> None:
+    random, doubted, rests = np.random.default_rng(6), 0, 200
+    for _ in range(rests):
+        resting = Resting(30.0)
+        for _ in range(CYCLES):
+            white = random.standard_normal(3) * NOISE / math.sqrt(PERIOD)
+            noise, sideways = random.standard_normal(2) * TILT * G
+            resting.cycle(white, 0.0, noise=float(noise), sideways=float(sideways))
+        doubted += resting.creep["doubt"] > 0.0
+    assert doubted <= 0.03 * rests
+
+
 def test_a_sensor_that_warms_up_is_no_string_that_turns() -> None:
     resting = Resting()
     for k in range(CYCLES):
         resting.cycle(np.full(3, 0.002 * k * DEG), 0.0)
     assert resting.creep["doubt"] == 0.0
+
+
+@pytest.mark.parametrize(("axis", "stays"), [(0, True), (1, True), (2, False)])
+def test_other_axes_that_move_later_take_back_no_turn_that_was_seen_before(axis: int, stays: bool) -> None:
+    """A string that ran on, and later a bias that wanders across; where all move on it is a sensor that warms up."""
+    resting = Resting().rest(run_on(0.1, 1.0)[:10])
+    for k in range(CYCLES):
+        drift = 0.004 * k * DEG
+        resting.cycle(np.full(3, drift) if axis == 2 else drift * np.eye(3)[axis], 0.0)
+    assert (resting.doubt_deg == pytest.approx(0.1, rel=0.1)) == stays
+    assert stays or resting.doubt_deg == 0.0
 
 
 @pytest.mark.parametrize("lean_deg", [15.0, 30.0, 60.0])

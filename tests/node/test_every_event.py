@@ -142,6 +142,7 @@ CASES: dict[Code, Callable[[], Bench]] = {
     Code.ENCODER_REVERSED: lambda: known().cycles(4, FAST, aided=False).aid(rate=-FAST).cycles(1, aided=False),
     Code.STRING_TURNED: lambda: known().cycles(20, FAST).cycles(30, spoil=crept),
     Code.AXES_EXCHANGED: lambda: known().cycles(40, FAST, spoil=exchanged),
+    Code.ENCODER_RATIO: lambda: halved(known()),
     Code.ENCODER_STANDS: lambda: standing(standing(known().cycles(4, FAST))).cycles(1, aided=False),
 }
 
@@ -157,6 +158,13 @@ def exchanged(w: Numbers, f: Numbers) -> tuple[Numbers, Numbers]:
 def standing(bench: Bench) -> Bench:
     """A head that turns on while its encoder tells of a rest."""
     return bench.cycles(1, FAST, aided=False).aid(rate=0.0)
+
+
+def halved(bench: Bench) -> Bench:
+    """A head of whose turns the encoder counts half."""
+    for _ in range(20):
+        bench.cycles(1, FAST, aided=False).aid(yaw=0.5 * bench.angle % math.tau, rate=0.5 * FAST)
+    return bench
 
 
 def warmed(w: Numbers, f: Numbers) -> tuple[Numbers, Numbers]:

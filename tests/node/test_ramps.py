@@ -103,6 +103,23 @@ def test_what_the_head_at_rest_contradicts_is_in_doubt(
     assert turning.state["systematic_var"] == pytest.approx(1e-6 + wanted)
 
 
+@pytest.mark.parametrize(("sigmas", "doubted"), [(1.9, False), (2.5, True), (-4.6, True)])
+def test_a_turn_that_is_too_slow_for_a_ramp_is_judged_by_the_head_at_rest_too(sigmas: float, doubted: bool) -> None:
+    """A head that is turned back by hand, minutes after its ramp: what slipped meanwhile shows in that one aiding."""
+    turning = Turning()
+    turning.ramp_up([0.0] * 6)
+    for _ in range(LONGEST + REACH):
+        turning.cycle(0.0, still=1)
+    for _ in range(6):
+        turning.cycle(math.radians(-2.0))
+    turning.cycle(0.0, still=3)
+    turning.node["guard"]["rate"], turning.state["last_sequence"] = 0.0, 7
+    turning.aid(sigmas)
+    wanted = (sigmas**2 - 1.0) * SIGMA**2 if doubted else 0.0
+    assert turning.ramp["doubt"] == pytest.approx(wanted)
+    assert turning.state["systematic_var"] == pytest.approx(wanted)
+
+
 def test_what_the_ramp_taught_of_the_scale_is_forgotten() -> None:
     turning = Turning()
     for k in range(3):

@@ -153,6 +153,29 @@ def test_a_step_that_goes_away_while_nothing_aids_leaves_no_yaw_surer_than_it_is
     assert off[-1] < 2.0 * std[-1], "it grows while nothing measures"
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("goes_away", [False, True])
+def test_a_rest_decides_whose_a_small_step_was(goes_away: bool) -> None:
+    """A string that winds up by 0.25 deg/s looks like a step, and its twist is what encoder and gyroscope differ by."""
+    plain, dps = StringOfOne(1), 0.25
+    begin, end = plain.turning(1, 0.4), plain.resting(1, 0.0)
+    string = StringOfOne(1, step(begin, dps, end if goes_away else 10**9), loss=0.0).advance(end - 5)
+    found = string.first("gyro_step", begin) - begin
+    apart = math.sqrt(float(string.tube.state["systematic_var"]))
+    assert 0.5 * found < apart / (dps * DEG * PERIOD) < found + 1.5
+    string.advance(40)
+    left = math.sqrt(float(string.tube.state["systematic_var"]))
+    assert left == pytest.approx(apart, rel=0.01) if goes_away else left < 0.02 * DEG
+
+
+def test_a_large_step_is_no_strings() -> None:
+    plain = StringOfOne(1)
+    begin = plain.turning(1, 0.4)
+    string = StringOfOne(1, step(begin, 2.0), loss=0.0).advance(begin + 40)
+    assert "gyro_step" in string.codes(begin)
+    assert float(string.tube.state["systematic_var"]) == 0.0
+
+
 @pytest.mark.parametrize("factor", [1.03, 1.005])
 def test_a_new_scale_is_named_and_learnt(factor: float, healthy: StringOfOne) -> None:
     at = healthy.resting(0)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import itertools
+import math
 import sys
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -12,25 +14,44 @@ from second_table import ROWS, drill, figures
 from third_table import THIRD_ROWS, drill_third
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
+TABLES = ("field", "field-drawn")
+FIGURES = ("nees_turning", "nees_rest", "unflagged_percent")
+FAULTS = ("gyro_step", "gyro_scale", "other_faults")
+
+
+def read_study(results: Path) -> dict[str, dict[str, str]]:
+    """Rows of the study's tables by their names; of a table that is not there none."""
+    study: dict[str, dict[str, str]] = {}
+    for path in (results / f"{name}.csv" for name in TABLES):
+        if path.exists():
+            with path.open() as file:
+                study |= {row["case"]: row for row in csv.DictReader(file)}
+    return study
+
+
+def study_figures(row: Mapping[str, str]) -> list[float]:
+    """As ``second_table.figures``; NaN for what a table that is older than the row does not have."""
+
+    def figure(key: str) -> float:
+        return float(row.get(key) or math.nan)
+
+    return [*map(figure, FIGURES), sum(map(figure, FAULTS)), figure("surveys_percent")]
 
 
 def main(seeds: int) -> None:
     """Print both tables beside each other."""
-    study = {}
-    for name in ("field", "field-drawn"):
-        with (RESULTS / f"{name}.csv").open() as file:
-            study |= {row["case"]: row for row in csv.DictReader(file)}
+    study = read_study(RESULTS)
     print(f"{'':56s}   NEES turning            rest     unflagged %    false faults       surveys %")
     print(f"{seeds} seeds of the second world, then the study{'':16s}" + 5 * "  second   study")
     with ProcessPoolExecutor() as pool:
         for name in (*ROWS, *THIRD_ROWS):
             take = drill if name in ROWS else drill_third
             ours = figures(name, list(pool.map(take, itertools.repeat(name), range(1, seeds + 1))))
-            theirs = [float(study[name][key]) for key in ("nees_turning", "nees_rest", "unflagged_percent")]
-            theirs.append(sum(float(study[name][key]) for key in ("gyro_step", "gyro_scale", "other_faults")))
-            theirs.append(float(study[name]["surveys_percent"]))
-            pairs = zip(ours, theirs, strict=True)
+            pairs = zip(ours, study_figures(study.get(name, {})), strict=True)
             print(f"{name:56s}" + "".join(f"{a:8.3g}{b:8.3g}" for a, b in pairs), flush=True)
+    missing = [name for name in (*ROWS, *THIRD_ROWS) if name not in study]
+    if missing:
+        print(f"{len(missing)} rows are not in the study's tables: `borechain experiment field` makes them anew")
 
 
 if __name__ == "__main__":

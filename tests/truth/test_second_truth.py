@@ -1,6 +1,7 @@
 """A second world, which shares no module with the simulator, shows the same of a node in the field."""
 
 import ast
+import math
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 from itertools import repeat
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from both_tables import read_study, study_figures
 from second_table import ROWS, Seen, drill
 from second_world import BLOCKS, LINES, RAMP, SPEED, TURNED, Disturbance, SecondWorld, smallest
 from third_table import THIRD_ROWS, drill_third
@@ -44,6 +46,20 @@ def test_it_shares_no_module_with_the_simulator_and_is_short() -> None:
 def test_it_has_every_row_of_the_study() -> None:
     assert list(ROWS) == [case.name for case in CASES]
     assert list(THIRD_ROWS) == [case.name for case in THIRD]
+
+
+def test_a_table_that_is_older_than_a_row_leaves_its_figures_open(tmp_path: Path) -> None:
+    """One without the row, one without some of its columns, one that was never made."""
+    assert read_study(tmp_path) == {}
+    (tmp_path / "field.csv").write_text("case,nees_turning,gyro_step,gyro_scale,surveys_percent\nclean,1.5,1,2,100\n")
+    (tmp_path / "field-drawn.csv").write_text(
+        "case,nees_turning,nees_rest,unflagged_percent,gyro_step,gyro_scale,other_faults,surveys_percent\n"
+        "stands,1.5,0.5,2,1,2,4,95\n"
+    )
+    study = read_study(tmp_path)
+    assert study_figures(study["stands"]) == [1.5, 0.5, 2.0, 7.0, 95.0]
+    assert study_figures(study["clean"]) == pytest.approx([1.5, math.nan, math.nan, math.nan, 100.0], nan_ok=True)
+    assert all(map(math.isnan, study_figures(study.get("a row of later", {}))))
 
 
 @cache

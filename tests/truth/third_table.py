@@ -143,8 +143,8 @@ def _slow_counter(random: np.random.Generator) -> Befalls:
     return Befalls(lost_share=log_uniform(random, 2e-4, 5e-3), lost_above=math.radians(random.uniform(35.0, 66.0)))
 
 
-def bad_day(random: np.random.Generator) -> Befalls:
-    """Five to eight mild disturbances, by one integer."""
+def bad_day(random: np.random.Generator, rigid: bool = False) -> Befalls:
+    """Five to eight mild disturbances, by one integer; of a ``rigid`` string, which neither winds slowly nor creeps."""
     plain = {
         "ripple": random.uniform(0.03, 0.3),
         "eccentricity_deg": random.uniform(0.01, 0.05),
@@ -158,11 +158,8 @@ def bad_day(random: np.random.Generator) -> Befalls:
         "turns_back_deg": random.uniform(1.0, 10.0),
         "lean_deg": random.uniform(0.01, 0.05),
     }
-    other = {
-        "wound": math.radians(random.uniform(0.05, 0.3)),
-        "creep": math.radians(random.uniform(0.001, 0.005)),
-        "run_on_s": log_uniform(random, 0.1, 2.0),
-    }
+    slow = {"wound": math.radians(random.uniform(0.05, 0.3)), "creep": math.radians(random.uniform(0.001, 0.005))}
+    other = {**({} if rigid else slow), "run_on_s": log_uniform(random, 0.1, 2.0)}
     chosen = random.permutation([*plain, *other])[: random.integers(5, 9)].tolist()
     kept = {name: value for name, value in plain.items() if name in chosen}
     made = Befalls(Disturbance(**kept))
@@ -201,6 +198,7 @@ THIRD_ROWS: dict[str, Draw] = {
         Disturbance(twist_deg=r.uniform(1.4, 3.2)), unaided_s=30.0
     ),
     "a bad day: five to eight mild ones": bad_day,
+    "a bad day of a string that neither winds nor creeps": lambda r: bad_day(r, rigid=True),
 }
 
 

@@ -71,6 +71,7 @@ class Code(enum.IntEnum):
     ENCODER_STANDS = 38
     AXES_EXCHANGED = 39
     STRING_TURNED = 40
+    ENCODER_RATIO = 41
 
 
 @by_type(lambda like, count: count << TOLD_Q)

@@ -16,8 +16,9 @@ from node.kernels.record.sensor_record import MAX_IMUS, MOUNT, OFFSET, STATIC, S
 
 # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches,
 # 6 no odd forces, 7 no swings, 8 no ramps, 9 no revisions, 10 no parts of cycles,
-# 11 no wrong aidings, 12 no counters that stand and no mirror, 13 no turns at rest and no errors that return
-NODE_LAYOUT: Final = 14
+# 11 no wrong aidings, 12 no counters that stand and no mirror, 13 no turns at rest and no errors that return,
+# 14 no ratio of encoder and gyroscope
+NODE_LAYOUT: Final = 15
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
@@ -130,6 +131,15 @@ SAME: Final = np.dtype(
     ],
     align=True,
 )
+RATIO: Final = np.dtype(
+    [
+        ("agreed", "i8"),  # cycles of turning in which encoder and gyroscope did, until they are known to
+        ("seen", "i8"),  # in a row that showed another ratio
+        ("usual", "f8"),  # the first of those, of the encoder's rate over the gyroscope's
+        ("told", "i8"),  # 1: the ratio is not one
+    ],
+    align=True,
+)
 GUARD: Final = np.dtype(
     [
         ("readings", READINGS),  # the newest readings, to see repeats
@@ -146,6 +156,7 @@ GUARD: Final = np.dtype(
         ("step", MISMATCH),  # mismatch that the constant bias has taken
         ("before_steps", "f8"),  # rad/s, the constant bias before the first step; NaN: it took none
         ("unproven", "f8"),  # rad/s, of a step that no rest has confirmed
+        ("disputed", "f8"),  # rad, by which encoder and gyroscope differed then
         ("first_step", "f8"),  # rad/s, size of that step
         ("jumped", "i8"),  # 1: the clock jumped in the cycle before
         ("untimely", "i8"),  # 1: the aiding before was untimely
@@ -166,6 +177,7 @@ GUARD: Final = np.dtype(
         ("mirror", MIRROR),  # of the sensors' axes
         ("creep", CREEP),  # of the string below a head at rest
         ("same", SAME),  # errors of the encoder that return
+        ("ratio", RATIO),  # of the encoder's turns to the gyroscope's
         ("jump", "f8"),  # rad, by which resets that nothing explains have moved the yaw
         ("last_jump", "f8"),  # rad, of it by the reset since the last aiding that agreed
         ("odd", "i8"),  # cycles in a row whose force at rest is not that of gravity as the filter has it

@@ -8,8 +8,10 @@ beyond the bias of before it,
 
 with P_b the variance of the bias b as the string came to rest, of which the part that wanders decays, and N the noise.
 Of a Gauss-Markov bias f = (1 - e^-x) / x, and h = 2 / x - (3 - 4 e^-x + e^-2x) / x^2 with x = t / tau, which is x / 2.1
-but for 0.04, at most 3/8. Where A is beyond that it is in doubt whether the string turned: its square is systematic
-variance of the yaw, of which the end of every rest leaves half.
+but for 0.04, at most 3/8. Where A is beyond that it is in doubt whether the string turned: its square, times the chance
+that it did, is systematic variance of the yaw, of which the end of every rest leaves half. Of z sigmas that chance is
+taken as (z^2 - 6) / 19 from z = 3 on: from five on it is certain, and at three, which one honest rest in forty shows,
+the variance still covers A with 2.5 sigmas.
 
 Two witnesses are asked. The *other axes*: a sensor that warms up, or feels another force, moves all its biases, a
 string none of those across. *Gravity*: of a tube that leans by I the tool face, the mean of eight samples against that
@@ -44,6 +46,7 @@ from node.kernels.arithmetic.operations import (
 from node.kernels.arithmetic.quantity import (
     NONE,
     ONE,
+    angle_quantity,
     factor_quantity,
     rate_quantity,
     variance_quantity,
@@ -60,8 +63,12 @@ DECAY: Final = factor_quantity(math.exp(-PERIOD / 15.87))  # of the part of a bi
 WANDERS: Final = 64  # cycles, in units of which h is the time: 2.1 time constants
 WANDERED: Final = 24  # cycles, after which it grows no more
 SHOWN: Final = 5  # sigmas of a turn, which chance does not make however many rests there are
+LEAST_SHOWN: Final = 3  # likewise, from where it is in doubt
+TWICE_FELT: Final = 7  # twice the sigmas of one that gravity shows alone, of many looks in a rest
+UNCERTAIN: Final = 6  # squares of sigmas that show nothing
 TOLD: Final = 9  # sigmas of one that is told: a scale that was learnt wrongly leaves a bias that is eight of them off
 BEYOND: Final = 3  # sigmas, of what is not noise
+RADIAN: Final = angle_quantity(1.0)
 LEAST_LEAN: Final = factor_quantity(0.5 * DEG)  # sine of the lean, from where there is a tool face
 LEAST_SQUARE: Final = factor_quantity((0.5 * DEG) ** 2)  # its square
 UNSEEN: Final = factor_quantity(1.9)  # rad, standard deviation of a tool face that tells nothing
@@ -83,7 +90,8 @@ def follow_creep(node: Any, settings: Any) -> None:
         return
     take_cycle(node, (state.cycles - 2) % RING)
     if has_sensor_moved(node):
-        withdraw_doubt(node)
+        if abs(creep.angle[2]) > LEAST_SHOWN * turn_std(node, 2):  # what it had shown before they moved stays
+            withdraw_doubt(node)
     elif 1 < creep.cycles < LONGEST:
         judge_turn(node, settings)
 
@@ -177,11 +185,14 @@ def judge_turn(node: Any, settings: Any) -> None:
     """Doubt the yaw by a turn that the gyroscope shows and gravity does not deny."""
     creep = node.guard.creep
     angle, std = abs(creep.angle[2]), turn_std(node, 2)
-    if creep.cycles >= 2 * QUICK and is_denied(node, settings, std):
-        withdraw_doubt(node)
-        return
-    if angle > SHOWN * std:
-        doubt_turn(node, angle)
+    if creep.cycles >= 2 * QUICK:
+        felt, felt_std = tool_face_turn(node), tool_face_std(node, settings)
+        if is_denied(node, std, felt, felt_std):
+            withdraw_doubt(node)
+            return
+        take_witness(node, std, abs(felt), felt_std)
+    if angle > LEAST_SHOWN * std:
+        doubt_turn(node, angle, turned_chance(angle, std))
     if creep.doubted == 1 and angle > TOLD * std and creep.cycles >= 2 * QUICK:
         creep.doubted = 2
         sigmas = event_number(quantity_ratio(angle, std), VECTOR_Q)
@@ -189,13 +200,24 @@ def judge_turn(node: Any, settings: Any) -> None:
 
 
 @kernel
-def is_denied(node: Any, settings: Any, std: float) -> bool:
-    """Whether gravity shows that the tube did not turn as its gyroscope has it, to within ``std`` (rad)."""
+def is_denied(node: Any, std: float, felt: float, felt_std: float) -> bool:
+    """Whether gravity shows a turn that is not the one that the gyroscope shows to within ``std`` (rad)."""
     own, own_std = factor_of(turn_between(node), ANGLE_Q), factor_of(std, ANGLE_Q)
-    felt, felt_std = tool_face_turn(node), tool_face_std(node, settings)
     both = times_factor(own_std, own_std) + times_factor(felt_std, felt_std)
     agree = times_factor(own - felt, own - felt) < BEYOND * BEYOND * both
     return bool(BEYOND * felt_std < abs(own) and not agree)
+
+
+@kernel
+def take_witness(node: Any, std: float, felt: float, felt_std: float) -> None:
+    """Doubt the yaw by a turn that gravity shows, where it tells turns finer than the gyroscope's ``std`` (rad).
+
+    It shows what the string turned by between the middles of two means; over the whole rest it turned as evenly.
+    """
+    creep = node.guard.creep
+    if felt_std < factor_of(std, ANGLE_Q) and 2 * felt > TWICE_FELT * felt_std:
+        whole = mean_of_total(creep.cycles * times_factor(RADIAN, felt), creep.cycles - QUICK)
+        doubt_turn(node, whole, turned_chance(felt, felt_std))
 
 
 @kernel
@@ -233,9 +255,18 @@ def tool_face_std(node: Any, settings: Any) -> float:
 
 
 @kernel
-def doubt_turn(node: Any, angle: float) -> None:
-    """The yaw is in doubt by an ``angle`` (rad)."""
-    creep, doubt = node.guard.creep, bounded_variance(angular_square(angle))
+def turned_chance(angle: float, std: float) -> float:
+    """Chance of a turn (a factor) where the gyroscope shows an ``angle`` above ``LEAST_SHOWN`` times ``std`` (rad)."""
+    part, certain = bounded_ratio(angle, SHOWN * std), ONE + 0 * angle
+    if part >= certain:
+        return certain
+    return mean_of_total(SHOWN * SHOWN * times_factor(part, part) - UNCERTAIN * certain, SHOWN * SHOWN - UNCERTAIN)
+
+
+@kernel
+def doubt_turn(node: Any, angle: float, chance: float) -> None:
+    """The yaw is in doubt by an ``angle`` (rad), which the string has turned by with a ``chance``."""
+    creep, doubt = node.guard.creep, bounded_variance(times_factor(angular_square(angle), chance))
     creep.doubted = max(creep.doubted, 1)
     if doubt > creep.doubt:
         take_doubt(node, doubt)

@@ -32,6 +32,7 @@ from node.kernels.turns.odd_force import keeps_out
 from node.kernels.turns.ramps import follow_fit, is_starting, learn_scale_anew
 from node.kernels.turns.same_errors import follow_same_errors
 from node.kernels.turns.sensor_trust import SANE_CYCLES, hold_safe_state, is_faulty, tell_recovery
+from node.kernels.turns.turn_ratio import watch_ratio
 from node.kernels.turns.yaw_doubts import follow_jump, follow_misfit, keep_contradiction, misfit_var
 
 AGREEING: Final = 4  # aidings in a row, until the node is trusted again
@@ -54,6 +55,8 @@ def guard_reading(node: Any, settings: Any, saturated: int, at: float) -> None:
     gyro, accelerometer = find_faults(guard.readings, settings, node.raw_rate[:], node.raw_force[:], saturated)
     known = abs(at - guard.rate_at) <= RATE_AGE
     measured = true_rate(turning[2] - state.static_bias[2] - state.bias[2], state.scale)
+    if gyro == 0:
+        watch_ratio(node, turning[2] - state.static_bias[2] - state.bias[2], at)
     if gyro == 0 and is_faulty(guard.gyro) and known and abs(measured - guard.rate) > CREDIBLE:
         gyro = guard.gyro.fault
     follow_gyro(node, gyro)

@@ -1,6 +1,9 @@
 """A lasting mismatch of gyroscope and aiding is learnt as a step of the bias or as a scale, and may be reconsidered.
 
-The readings go on, the constant bias takes the mismatch, and the variances of yaw and bias are opened.
+The readings go on, the constant bias takes the mismatch, and the variances of yaw and bias are opened. A string that
+winds up below its head looks like a small step of the gyroscope, and what the two differed by as that was found is then
+its twist. Until a rest shows whose it was the angle is systematic variance of the yaw: a bias that stays was the
+gyroscope's, one that goes back was none, and the twist is in doubt as that of a ramp.
 """
 
 from __future__ import annotations
@@ -63,6 +66,8 @@ def learn_mismatch(node: Any) -> None:
             guard.before_steps, guard.first_step = state.static_bias[2], abs(found.rate)
         state.static_bias[2] -= found.rate
         guard.unproven = max(guard.unproven, min(abs(found.rate), UNWINDING))
+        if abs(found.rate) <= UNWINDING:
+            guard.disputed = max(guard.disputed, abs(state.innovation))
         prior += angular_square(times_factor(found.rate, UNSURE))
     take_mismatch(state, prior, of_scale)
     state.rejected = 0

@@ -7,9 +7,9 @@ what they contradicted it by is systematic variance of the yaw, and half of that
 fits. What the ramp taught of the gyroscope's scale is forgotten. In honest noise the sum of squares stays far below its
 limit (0.7 an aiding, at most 22 in 640 ramps), and none of this happens.
 
-The head at rest is measured once in a rest, and that measurement judges the turn to it: one beyond two sigmas says that
-the string ran on into some play, or that the gyroscope's readings were not of their time. It is used, and what it
-contradicted is in doubt likewise. One honest stop in twenty is doubted so, by no more than it deserves.
+The head at rest is measured once in a rest, and that measurement judges the turn to it, however slow it was: one beyond
+two sigmas says that the string ran on into some play, or that the gyroscope's readings were not of their time. It is
+used, and what it contradicted is in doubt likewise. One honest stop in twenty is doubted so, by what it deserves.
 
 A gyroscope's scale is not the same in both directions (asymmetry, IEEE Std 528). It is learnt in the one in which the
 string turns fast, so an angle turned back is off by a part of itself.
@@ -113,13 +113,14 @@ def follow_fit(node: Any, rejected: int) -> None:
     """Take the innovation of an aiding in; of those that are rejected the first in a row may be an outlier."""
     state, ramp = node.filter, node.guard.ramp
     whole = state.innovation_var
-    if ramp.left == 0 or not whole > 0 or (rejected == 1 and state.rejected == 1):
+    if not whole > 0 or (rejected == 1 and state.rejected == 1):
         return
     own = angular_square(state.innovation)
-    ramp.seen += 1
-    ramp.misfit += min(quantity_ratio(own, whole), MOST_TIMES)
-    ramp.largest = max(ramp.largest, min(own, MOST * min(whole, LARGEST)))
-    if ramp.misfit > LIMIT:
+    if ramp.left > 0:
+        ramp.seen += 1
+        ramp.misfit += min(quantity_ratio(own, whole), MOST_TIMES)
+        ramp.largest = max(ramp.largest, min(own, MOST * min(whole, LARGEST)))
+    if ramp.left > 0 and ramp.misfit > LIMIT:
         doubt_ramp(node, own, rejected)
     elif rejected == 0 and own > CONTRADICTED * whole and has_come_to_rest(node):
         doubt_stop(node, own - whole)

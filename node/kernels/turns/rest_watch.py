@@ -61,7 +61,7 @@ def watch_rest(node: Any, settings: Any, at: float) -> None:
         if not is_tilting(state, node.config):
             take_bias(node, settings, since)
     else:
-        guard.unproven = 0
+        guard.unproven, guard.disputed = 0, 0
         if since == CYCLES:
             calm_down(node, settings)
 
@@ -195,7 +195,8 @@ def take_bias(node: Any, settings: Any, since: int) -> None:
     state.rejected = 0
     guard.before_steps = NONE
     guard.step.fault = 0
-    guard.unproven = 0
+    guard.ramp.doubt = bounded_variance(max(guard.ramp.doubt, angular_square(guard.disputed)))
+    guard.unproven, guard.disputed = 0, 0
     queue_event(node, BIAS_MOVED, event_degrees(moved_z, RATE_Q), NONE, NONE, NONE)
 
 

@@ -47,6 +47,7 @@ from node.kernels.filter.resets import turn_present
 from node.kernels.record.events import Code, event_degrees, event_number, queue_event
 from node.kernels.turns.same_errors import same_error_var
 from node.kernels.turns.swings import swing_var
+from node.kernels.turns.turn_ratio import ratio_var
 
 MEMORY: Final = 32  # aidings over which the misfit is averaged
 DOUBTED: Final = factor_quantity(
@@ -86,7 +87,8 @@ def noise_var(node: Any) -> float:
 def unexplained_var(node: Any) -> float:
     """Variance (rad^2) of the yaw that no filter averages away: of misfit, string, encoder, of a late window."""
     guard, dated = node.guard, passing_var(node) + delay_var(node)
-    of_string, of_encoder = guard.ramp.doubt + guard.creep.doubt, angular_square(guard.jump) + same_error_var(node)
+    of_string = guard.ramp.doubt + guard.creep.doubt + angular_square(guard.disputed)
+    of_encoder = angular_square(guard.jump) + same_error_var(node) + ratio_var(node)
     return bounded_variance(misfit_var(node) + of_string + of_encoder + dated)
 
 
