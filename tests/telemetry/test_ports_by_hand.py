@@ -18,6 +18,7 @@ from telemetry.media.memory import MemoryMedium, MemoryPort, joined_ports
 from telemetry.media.port import PortFrame, Priority, TubeEnd
 from telemetry.messages import Severity, Side
 from telemetry.runtime.stepped import CYCLE, DEPTH, Due, DueEvent, Sent, run_step
+from telemetry.unwritten import Unwritten
 
 
 @pytest.mark.parametrize("side", list(Side))
@@ -179,3 +180,38 @@ def test_refused_seals_are_told_at_most_once_a_minute_with_all_of_them_and_what_
         (Severity.WARNING, "seal_refused", {"refused": 12, "mostly": "old"}),
         (Severity.WARNING, "seal_refused", {"refused": 49, "mostly": "tag"}),
     ]
+
+
+class Unasked(Unwritten):
+    """Says how large it may be, and minds being written."""
+
+    __slots__ = ("size", "written")
+
+    def __init__(self, size: int) -> None:
+        self._written = None
+        self.size, self.written = size, 0
+
+    @property
+    def most(self) -> int:
+        return self.size
+
+    def _write(self) -> bytes:
+        self.written += 1
+        return bytes(self.size - 2)
+
+
+@pytest.mark.parametrize(
+    ("most", "is_larger", "written"), [(10, False, 0), (11, False, 1), (12, False, 1), (13, True, 1)]
+)
+def test_a_frame_is_written_to_be_measured_only_where_it_may_be_too_large(
+    most: int, is_larger: bool, written: int
+) -> None:
+    content = Unasked(most)
+    frame = PortFrame(content)
+    assert [frame.is_larger_than(10), content.written] == [is_larger, written]
+    assert (len(frame.payload), len(content), bytes(content), content.written) == (
+        most - 2,
+        most - 2,
+        bytes(most - 2),
+        1,
+    )
