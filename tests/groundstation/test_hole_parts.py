@@ -11,6 +11,7 @@ import pytest
 
 from groundstation.service.hole.adjusted_stations import AdjustedStations, learnt_wander
 from groundstation.service.hole.beginnings import grown_start
+from groundstation.service.hole.movement import Moved, Movement, PlacedStop
 from groundstation.service.hole.packed_end import LEAST_WEIGHT, packed_end
 from groundstation.service.hole.resolving import force_vars
 from groundstation.service.hole.string_prior import (
@@ -21,6 +22,10 @@ from groundstation.service.hole.string_prior import (
     name_cause,
 )
 from groundstation.survey.adjustment.looks import StartingPoint
+from groundstation.survey.adjustment.next_stop import NextStop, _gains
+from groundstation.survey.adjustment.screen import late_tests
+from groundstation.survey.fusion import fusion as fusion_room
+from groundstation.survey.fusion.fusion import DEPARTED, Weighting
 from groundstation.survey.path.normal_mixture import NormalMixture
 from groundstation.survey.wall.column_deviation import Deviation
 from groundstation.survey.wall.projected_end import ProjectedEnd
@@ -124,3 +129,78 @@ def test_a_survey_points_back_where_one_leg_would_bend_beyond_two_thirds_of_a_ha
     told: Any = down
     assert AdjustedStations(collar, told=told, below=below).turned_back() == ([4.0] if is_back else [])
     assert AdjustedStations(told, below=below).turned_back() == ([4.0] if is_back else [])
+
+
+# what is judged anew, and how far back
+
+
+def test_a_stop_that_is_judged_anew_forgets_what_moved_from_its_begin_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    stops: Any = None
+    movement = Movement(stops, [])
+    station: Any = SimpleNamespace(md=7.0, drops=[0, 1, 2])
+    other: Any = SimpleNamespace(md=9.0, drops=[])
+    nothing: Any = None
+    movement.moved = [Moved(7.0, at, 1, nothing) for at in (1.0, 2.9, 3.0, 3.5, 6.0)]
+    judged = [[PlacedStop(3.0, 7.0, 1, 0, station)], [PlacedStop(8.0, 9.0, 0, 1, other)]]
+    asked: list[float] = []
+    monkeypatch.setattr(Movement, "_stops_since", lambda self, since: asked.append(since) or judged)
+    monkeypatch.setattr(Movement, "_judge_stop", lambda self, one: [other] if one is judged[1] else [])
+    assert movement.judge_since(5.0) == {7.0: station, 9.0: other}
+    assert ([one.at for one in movement.moved], station.drops, asked) == ([1.0, 2.9], [0, 2], [5.0])
+
+
+@pytest.mark.parametrize(
+    ("size", "weighting"),
+    [
+        (0.0, Weighting.LINEAR), (DEPARTED, Weighting.LINEAR), (DEPARTED + 1e-9, Weighting.QUADRATIC),
+        (4.0, Weighting.QUADRATIC), (4.0 + 1e-9, Weighting.CUBIC),
+    ],
+)  # fmt: skip
+def test_a_reading_weighs_by_how_far_it_departs(
+    monkeypatch: pytest.MonkeyPatch, size: float, weighting: Weighting
+) -> None:
+    monkeypatch.setattr(fusion_room, "newest_departure", lambda _: (np.zeros(2), size))
+    assert fusion_room.adaptive_weighting([]) is weighting
+
+
+def test_a_long_hole_is_screened_in_its_sixteen_latest_stops() -> None:
+    stop = np.repeat(np.arange(40), 2)
+    left = np.random.default_rng(1).standard_normal((80, 3))
+    weights = np.repeat(np.diag([1.0, 2.0, 5.0])[None], 80, axis=0)
+    found: Any = SimpleNamespace(
+        looks=SimpleNamespace(stop=stop, tube=np.tile([1, 0], 40)), linear=SimpleNamespace(weights=weights), left=left
+    )
+    (each, told), (since, _) = late_tests(found)
+    assert told.tolist() == [3] * 32
+    assert each == pytest.approx(np.sum(left[48:] ** 2 * [1.0, 2.0, 5.0], axis=1))
+    expected = []
+    for tube in (0, 1):
+        own = left[48:][np.tile([1, 0], 16) == tube][::-1]
+        pulled = np.cumsum(own * [1.0, 2.0, 5.0], axis=0)
+        expected += (np.sum(pulled**2 / [1.0, 2.0, 5.0], axis=1) / np.arange(1, 17)).tolist()
+    assert since == pytest.approx(np.array(expected))
+
+
+def test_what_looks_to_come_gain_is_what_a_dense_update_takes_off() -> None:
+    random = np.random.default_rng(3)
+    count, many, wide = 2, 3, 9
+    root = random.standard_normal((count * wide + 3, count * wide + 3))
+    whole = root @ root.T + np.eye(len(root))
+    cov, of_toe = whole[:-3, :-3], whole[:-3, -3:]
+    jacobians = random.standard_normal((many, count, 3, wide))
+    noise = np.repeat(np.diag([0.5, 1.0, 2.0])[None, None], many, axis=0).repeat(count, axis=1)
+    noise[:, 1] *= 3.0
+    gains = _gains(jacobians, noise, cov.reshape(count, wide, count, wide), of_toe.reshape(count, wide, 3))
+    for one in range(many):
+        design = np.zeros((3 * count, count * wide))
+        spread = np.zeros((3 * count, 3 * count))
+        for place in range(count):
+            design[3 * place : 3 * place + 3, wide * place : wide * place + wide] = jacobians[one, place]
+            spread[3 * place : 3 * place + 3, 3 * place : 3 * place + 3] = noise[one, place]
+        gain = np.linalg.solve(design @ cov @ design.T + spread, design @ of_toe)
+        assert gains[one] == pytest.approx(float(np.trace((design @ of_toe).T @ gain)))
+
+
+def test_a_next_stop_is_worth_what_it_has_over_one_without_a_turn() -> None:
+    planned = NextStop(np.array([0.0, 1.0, 2.0]), np.array([0.30, 0.18, 0.55]))
+    assert (planned.best, planned.worth) == (1.0, pytest.approx(0.12))
