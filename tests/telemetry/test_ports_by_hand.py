@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections import Counter, deque
 from types import SimpleNamespace
 from typing import Any
@@ -18,6 +19,7 @@ from telemetry.media.memory import MemoryMedium, MemoryPort, joined_ports
 from telemetry.media.port import PortFrame, Priority, TubeEnd
 from telemetry.messages import Severity, Side
 from telemetry.runtime.stepped import CYCLE, DEPTH, Due, DueEvent, Sent, run_step
+from telemetry.unwritten import Unwritten
 
 
 @pytest.mark.parametrize("side", list(Side))
@@ -174,8 +176,81 @@ def test_refused_seals_are_told_at_most_once_a_minute_with_all_of_them_and_what_
     watch.look(10.0 + TELL_EVERY - 1e-6)
     assert len(said) == 1
     watch.look(10.0 + TELL_EVERY)
+    assert len(said) == 2
     watch.look(10.0 + 3.0 * TELL_EVERY)
     assert said == [
         (Severity.WARNING, "seal_refused", {"refused": 12, "mostly": "old"}),
         (Severity.WARNING, "seal_refused", {"refused": 49, "mostly": "tag"}),
     ]
+
+
+class SilentController:
+    """Of a bus on which nothing is ever heard."""
+
+    def receive(self) -> None:
+        time.sleep(0.005)
+
+    def send(self, identifier: int, data: bytes) -> None:
+        """Nobody acknowledges it."""
+
+    def shutdown(self) -> None:
+        """Nothing to close."""
+
+
+def test_frames_wait_for_who_listens_in_their_order_and_fewer_for_an_end_that_is_absent(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("telemetry.media.can_port.open_controller", lambda *_: SilentController())
+    bus: Any = None
+    port = CanPort("joint", bus, 7, 8, 40)
+    heard: list[bytes] = []
+    try:
+        with port._lock:
+            monkeypatch.setattr(port._exchange, "on_frame", lambda identifier, data, now: data or None)
+            sent = [bytes([number]) for number in range(UNHEARD_LIMIT + 3)]
+            for payload in (*sent, b""):
+                port._on_arrival(EXTENDED | 5, payload, 0.0)
+            port.listen(lambda content: heard.append(bytes(content)))
+            port._on_arrival(EXTENDED | 5, b"last", 0.0)
+            assert heard == [*sent[3:], b"last"]
+            for is_alone, limit in ((True, 40), (False, 512), (True, 40)):
+                monkeypatch.setattr(port._exchange, "is_alone", lambda now, is_alone=is_alone: is_alone)
+                port.send(PortFrame(b"x"))
+                assert port._queue.limit == limit
+    finally:
+        port.close()
+
+
+class Unasked(Unwritten):
+    """Says how large it may be, and minds being written."""
+
+    __slots__ = ("size", "written")
+
+    def __init__(self, size: int) -> None:
+        self._written = None
+        self.size, self.written = size, 0
+
+    @property
+    def most(self) -> int:
+        return self.size
+
+    def _write(self) -> bytes:
+        self.written += 1
+        return bytes(self.size - 2)
+
+
+@pytest.mark.parametrize(
+    ("most", "is_larger", "written"), [(10, False, 0), (11, False, 1), (12, False, 1), (13, True, 1)]
+)
+def test_a_frame_is_written_to_be_measured_only_where_it_may_be_too_large(
+    most: int, is_larger: bool, written: int
+) -> None:
+    content = Unasked(most)
+    frame = PortFrame(content)
+    assert [frame.is_larger_than(10), content.written] == [is_larger, written]
+    assert (len(frame.payload), len(content), bytes(content), content.written) == (
+        most - 2,
+        most - 2,
+        bytes(most - 2),
+        1,
+    )

@@ -12,6 +12,9 @@ import pytest
 from groundstation.calibration.accuracy import Accuracy, combined_accuracy, relative_error, sensor_characteristic
 from groundstation.calibration.attitudes import AttitudeFit
 from groundstation.calibration.gravity_sphere import PARAMETERS, fit_gravity_sphere
+from groundstation.calibration.intervals import Interval
+from groundstation.calibration.jig import Jig, combined_uncertainty, settings_of
+from groundstation.calibration.mwd_design import with_jig
 from groundstation.calibration.mwd_model import Readings
 from groundstation.calibration.quality import QualityVerdict, judge_readings
 from groundstation.calibration.rest_finder import MARGIN, SHORTEST, WINDOW, find_rests
@@ -77,6 +80,17 @@ def test_gravity_alone_tells_matrix_and_bias_as_well_as_it_says() -> None:
     assert np.mean(of_residuals) == pytest.approx(0.01**2 * (30 - PARAMETERS), rel=0.15)
 
 
+def test_what_is_said_of_a_matrix_holds_for_axes_of_different_scales() -> None:
+    scales = np.diag([1.8, 0.6, 1.0])
+    off: list[np.ndarray] = []
+    said: list[np.ndarray] = []
+    for seed in range(40):
+        fit = fit_gravity_sphere((rests(30, 0.01, seed) - BIAS) @ scales.T, GRAVITY)
+        off.append(np.diag(fit.matrix - scales @ MATRIX) ** 2)
+        said.append(np.diag(fit.matrix_std) ** 2)
+    assert np.mean(off, axis=0) / np.mean(said, axis=0) == pytest.approx(1.0, rel=0.5)
+
+
 def test_a_rest_that_is_left_out_is_judged_by_the_other_half() -> None:
     means = rests(40, 0.02, 7)
     fit = fit_gravity_sphere(means, GRAVITY)
@@ -124,6 +138,8 @@ def test_a_sensor_that_is_still_held_is_at_rest_for_its_force_alone_and_one_that
     none = np.zeros(3000, dtype=bool)
     assert [round(part.start, -2) for part in find_rests(force, None, none)] == [0, 500, 1000, 1500, 2000, 2500]
     assert [round(part.start, -2) for part in find_rests(force, rate, none)] == [0, 500, 2000, 2500]
+    force[500:800] = random.standard_normal((300, 3))  # shaken without a turn
+    assert [round(part.start, -2) for part in find_rests(force, rate, none)] == [0, 2000, 2500]
     rate[2000:2300] += [0.0, 0.0, 0.4]
     two = find_rests(force[1400:2400], rate[1400:2400], none[1400:2400])
     assert len(two) == 2  # of two none is the odd one
@@ -253,8 +269,8 @@ def test_errors_of_a_triad_are_shown_in_degrees() -> None:
 # twelve tool faces
 
 
-def twelve(widest_gap_deg: float = 30.0, off: float = 0.0, tilt_deg: float = 45.0) -> Readings:
-    faces = np.radians((360.0 - widest_gap_deg) / 11.0 * np.arange(12))
+def twelve(widest_gap_deg: float = 30.0, off: float = 0.0, tilt_deg: float = 45.0, first_deg: float = 0.0) -> Readings:
+    faces = np.radians(first_deg + (360.0 - widest_gap_deg) / 11.0 * np.arange(12))
     gravity = np.column_stack([np.cos(faces), np.sin(faces), np.ones(12)])
     tilt, azimuth = np.full(12, math.radians(tilt_deg)), np.full(12, 0.01)
     size = np.ones(12)
@@ -269,12 +285,67 @@ def test_twelve_tool_faces_agree_below_their_limits_and_lie_all_around() -> None
     assert [verdict.passed for verdict in judge_readings(twelve(off=1e-6)).verdicts] == [False] * 3
     report = judge_readings(twelve(off=-1e-6))
     assert ([verdict.passed for verdict in report.verdicts], report.passed) == ([True] * 3, True)
-    judge_readings(twelve(59.9))
-    with pytest.raises(CalibrationError, match="no tool face within 61 deg"):
-        judge_readings(twelve(60.6))
+    for first in range(0, 360, 15):  # wherever the gap lies, also across zero
+        judge_readings(twelve(59.9, first_deg=first))
+        with pytest.raises(CalibrationError, match="no tool face within 61 deg"):
+            judge_readings(twelve(60.6, first_deg=first))
     leaning = twelve()
     leaning.tilt[0] = math.radians(0.9)
     with pytest.raises(CalibrationError, match="not one attitude"):
         judge_readings(leaning)
     with pytest.raises(CalibrationError, match="within 1 deg of the vertical"):
         judge_readings(twelve(tilt_deg=0.95))
+
+
+# a jig that is itself off
+
+
+def test_what_a_jig_does_is_in_the_deviation_and_out_of_the_noise() -> None:
+    random = np.random.default_rng(4)
+    truth = np.repeat(random.standard_normal((6, 3)), 2, axis=0)
+    basis = np.column_stack([truth, np.ones(12)])
+    matrix, jig = np.array([[1.1, 0.02, 0.0], [0.0, 0.9, 0.03], [0.01, 0.0, 1.0]]), Jig(0.02, 0.01)
+    settings = settings_of(truth)
+    assert [int(np.sum(settings == one)) for one in np.unique(settings)] == [2] * 6
+    gain = np.linalg.pinv(basis)
+    drawn = 0.01 * random.standard_normal((12, 3))
+    residuals = 8.0 * (drawn - basis @ gain @ drawn)
+    found = combined_uncertainty(basis, residuals, truth, matrix, settings, jig)
+    for axis in range(3):
+        cov = np.zeros((12, 12))
+        for one, other in np.ndindex(12, 12):
+            share = 0.02**2 * (settings[one] == settings[other]) + 0.01**2 * (one == other)
+            turns = [np.array([np.cross(unit, truth[row]) for unit in np.eye(3)]).T for row in (one, other)]
+            cov[one, other] = share * float(matrix[axis] @ turns[0] @ turns[1].T @ matrix[axis])
+        left = np.eye(12) - basis @ gain
+        noise = (float(residuals[:, axis] @ residuals[:, axis]) - float(np.trace(left @ cov))) / 8.0
+        assert noise > 0.0
+        expected = np.sqrt(np.diag(gain @ (cov + noise * np.eye(12)) @ gain.T))
+        assert found.std[:, axis] == pytest.approx(expected)
+
+
+def test_beyond_its_knots_an_interval_grows_as_the_root_of_the_squares() -> None:
+    interval = Interval(np.array([0.0, 2.0]), np.array([0.3, 1.5]))
+    assert interval.half_width(np.exp([1.0, 2.0, 5.0, -1.0])) == pytest.approx(np.exp([0.9, 1.5, 3.0, 0.3]))
+
+
+def test_a_lean_of_the_jig_is_one_error_at_each_tilt_and_another_at_each_tool_face_upright() -> None:
+    random = np.random.default_rng(9)
+    angle = np.array([0.0, 0.0, 0.5, 0.5, 0.5, 1.2, 1.2])
+    rows = random.standard_normal((7, 4, 3))
+    problem: Any = SimpleNamespace(
+        angle=angle, residual_jacobian=lambda _: rows.reshape(28, 3), on_axis=lambda: angle == 0.0,
+        residuals=lambda _: np.zeros(28),
+    )  # fmt: skip
+    weights = np.diag([2.0, 3.0, 5.0])
+    for jig in (Jig(0.02, 0.0), Jig(0.0, 0.03), Jig(0.02, 0.03)):
+        normal = np.zeros((3, 3))
+        for one, other in np.ndindex(7, 7):
+            if angle[one] > 0.0:
+                share = jig.common**2 * (angle[one] == angle[other]) + jig.random**2 * (one == other)
+                normal += share * np.outer(rows[one, 1], rows[other, 1])
+        for row in rows[:2]:
+            normal += (jig.common**2 + jig.random**2) * (np.outer(row[1], row[1]) + np.outer(row[2], row[2]))
+        cov, noise = with_jig(problem, np.zeros(3), weights, jig)
+        assert cov == pytest.approx(weights @ normal @ weights)
+        assert noise == 0.0

@@ -80,6 +80,8 @@ def test_of_several_holes_the_rows_of_the_chosen_one_are_read_with_their_lines()
         choose_hole(FILE, made, {1}, TableWish())
     with pytest.raises(SurveyError, match="--hole D: expected one of its holes, A, B, C, x, y"):
         choose_hole(FILE, made, {1}, TableWish(hole="D"))
+    twice = table(["md", "hole", "rig"], "0 A B", "5 B A", "7 B C")  # a name in two columns is the first one's
+    assert choose_hole(FILE, twice, {0}, TableWish(hole="B"))[0].lines == [12, 14]
     many = table(["well", "md"], *(f"{k} 0" for k in range(8)))
     with pytest.raises(SurveyError, match=r"well tells 8 holes apart: 0, 1, 2, 3, 4, 5 \.\.\.;"):
         choose_hole(FILE, many, {1}, TableWish())
