@@ -170,7 +170,7 @@ class LivingSensor:
         random, begin, count = np.random.default_rng(6), time.monotonic(), 0
         while not self._stop.is_set():
             asked, _, _ = select.select([self.line.end], [], [], 0.05)
-            with contextlib.suppress(OSError):  # the driver's settings; a line that nobody reads is full
+            with contextlib.suppress(OSError):  # the driver's settings; a line that no driver reads is full
                 if asked:
                     os.read(self.line.end, 4096)
                 due = round(100.0 * (time.monotonic() - begin)) - count

@@ -38,7 +38,7 @@ def section(number: int) -> str:
 
 
 class Followed:
-    """Who follows the page: a stick, three machines, and what the commands printed."""
+    """What follows the page: a stick, three machines, and what the commands printed."""
 
     def __init__(self, folder: Path, sensor: str, counter: EmulatedCounter, hub: int, capture: Any) -> None:
         self.work, self._capture = folder / "work", capture
