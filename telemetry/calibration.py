@@ -132,7 +132,8 @@ def from_json(text: str) -> Calibration:
     _expect(whole["format"] == FORMAT, "format", str(FORMAT), whole["format"])
     content = whole["calibration"]
     known = {field.name for field in fields(Calibration)}
-    _check_keys(content, "calibration", known if "valid" in content else known - {"valid"})
+    has_range = isinstance(content, dict) and "valid" in content
+    _check_keys(content, "calibration", known if has_range else known - {"valid"})
     _check_keys(content["provenance"], "provenance", {field.name for field in fields(Provenance)})
     calibration = Calibration(**content | {"provenance": Provenance(**content["provenance"])})
     _expect(whole["sha256"] == calibration.sha256(), "sha256", calibration.sha256(), whole["sha256"])

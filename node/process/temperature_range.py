@@ -14,6 +14,7 @@ import numpy as np
 
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading
+from node.kernels.arithmetic.formats import Array
 from node.kernels.filter.resets import doubt_bias
 from node.process.drivers.source import Say
 from telemetry.messages import Scalar, Severity
@@ -55,7 +56,7 @@ class TemperatureRange:
         if not beyond:
             self._calm(config)
 
-    def _doubt(self, added: np.ndarray, state: Any, config: Any) -> None:
+    def _doubt(self, added: Array, state: Any, config: Any) -> None:
         """The bias wanders by what was ``added`` (3,) rad/s, from now on."""
         for k, moved in enumerate(added.tolist()):
             if moved > config["bias_std"][k]:
@@ -84,15 +85,15 @@ class TemperatureRange:
             self._say(Severity.WARNING, "temperature_within", which)
 
 
-def unmeasured_bias(imu: ImuSettings, off: float) -> np.ndarray:
+def unmeasured_bias(imu: ImuSettings, off: float) -> Array:
     """What a gyroscope's polynomials add (3,) rad/s from the end of their range to ``off`` it (K, negative below)."""
     if off == 0.0:
         return np.zeros(3)
     end = imu.corrected_within[1 if off > 0.0 else 0]
-    return bias_at(imu.gyroscope, end + off) - bias_at(imu.gyroscope, end)
+    return np.asarray(bias_at(imu.gyroscope, end + off) - bias_at(imu.gyroscope, end))
 
 
-def bias_at(sensor: SensorParameters, temperature: float) -> np.ndarray:
+def bias_at(sensor: SensorParameters, temperature: float) -> Array:
     """Bias (3,) of a sensor at a temperature (C), beyond its constant."""
     powers = np.arange(1, len(sensor.bias_slopes) + 1)
     return np.asarray((temperature - sensor.reference) ** powers @ np.array(sensor.bias_slopes))
