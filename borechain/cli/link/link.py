@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from borechain.cli.link.can import dbc, load
+from borechain.cli.link.chip_command import chip
 from borechain.cli.link.pipe import pipe
 from borechain.cli.link.soil_command import soil
 
@@ -19,8 +20,9 @@ def link() -> None:
       borechain link pipe --frequency-ghz 5 --grade "X52 seamless"
       borechain link load --tubes 25 --bitrate 500000
       borechain link dbc --check their.dbc
+      borechain link chip --line /dev/ttyACM0 --bus can0
     """
 
 
-for command in (soil, pipe, load, dbc):
+for command in (soil, pipe, load, dbc, chip):
     link.add_command(command)
