@@ -16,6 +16,8 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from groundstation.calibration.allan_analysis import AXES, LONGEST_IN_FIT, AllanResult
+from groundstation.calibration.applied_series import UNITS as SERIES_UNITS
+from groundstation.calibration.applied_series import AppliedSeries
 from groundstation.calibration.attitudes import AttitudeFit
 from groundstation.calibration.mwd_model import ACCELEROMETER_AXES, Triad, temperature_powers
 from groundstation.calibration.mwd_solve import MwdFit
@@ -76,6 +78,23 @@ def quality_panels(report: QualityReport) -> tuple[Panel, ...]:
 def allan_panels(results: Sequence[AllanResult], unit: str) -> tuple[Panel, ...]:
     """The curves."""
     return (Panel("Allan deviation", 2.9, lambda part: draw_allan_curves(part, results, unit)),)
+
+
+def series_panels(found: Sequence[AppliedSeries]) -> tuple[Panel, ...]:
+    """Readings in time before and after their calibrations, a panel a sensor."""
+    return tuple(
+        Panel(f"{series.sensor.capitalize()} in time", 2.1, lambda part, series=series: draw_series(part, series))  # type: ignore[misc]
+        for series in found
+    )
+
+
+def draw_series(part: Figure | SubFigure, series: AppliedSeries) -> None:
+    """Each axis of a sensor in time, before and after its calibration."""
+    for k, axes in enumerate(row_of(part, 3, sharex=True)):
+        for readings, name, colour in ((series.before, "before", BEFORE), (series.after, "after", AFTER)):
+            axes.plot(series.times, readings[:, k], color=colour, lw=0.7, label=name)
+        axes.set(xlabel="time, s", ylabel=f"{AXES[k]}, {SERIES_UNITS[series.sensor]}")
+    axes.legend()
 
 
 def before_after(part: Figure | SubFigure, names: Sequence[str], pairs: Sequence[tuple[str, Array, Array]]) -> None:

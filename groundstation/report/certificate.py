@@ -66,7 +66,10 @@ def template_data(sheet: Sheet, panels: Sequence[Panel], identity: Identity) -> 
                 {"title": say(t.title), "columns": say(list(t.columns)), "rows": words.rows(t.rows)}
                 for t in sheet.tables
             ],
-            "figures": [{"caption": say(p.caption), "svg": render_panels([p], "svg").decode()} for p in panels],
+            "figures": [
+                {"caption": say(panel.caption), "svg": render_panels([panel], "svg", identity.language).decode()}
+                for panel in panels
+            ],
         }
     )
 

@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.report.document import AS_BUILT, Document, Origin, ReportSection
+from groundstation.report.figure_words import svg_in
 from groundstation.report.plots import survey_figure
-from groundstation.report.style import svg_of
 from groundstation.report.word_tables import NOT_STATED
 from groundstation.survey.tools.instruments import SurveyTool
 from groundstation.survey.wall.column_deviation import ColumnDesign, Deviation, Tolerance, point_deviation
@@ -110,7 +110,9 @@ def column_report(record: ColumnRecord, site: ReportSite, origin: Origin) -> Doc
             f"Column {record.design.name} from its head, {100.0 * CONFIDENCE:g} % regions",
             _from_its_head(record.design),
         )  # fmt: skip
-        sections.append(ReportSection("Plan and sections", figure=svg_of(figure), new_page=True))
+        sections.append(
+            ReportSection("Plan and sections", figure=svg_in(figure, origin.papers.language), new_page=True)
+        )
     title = f"Column {record.design.name}"
     facts = [*site.facts(), *paper_facts(record)]
     return Document("Column report", title, site.project or AS_BUILT, verdict, good, facts, sections, origin)

@@ -12,7 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, SubFigure
 
+from groundstation.report.figure_words import translate_figure
 from groundstation.report.style import GREY, METADATA, SERIES, STYLE, WRONG
+from groundstation.report.word_tables import ENGLISH
 
 WIDTH = 6.7  # in, the text width of an A4 page
 FORMATS = tuple(suffix.removeprefix(".") for suffix in METADATA)
@@ -29,8 +31,8 @@ class Panel:
     draw: Callable[[Figure | SubFigure], None]
 
 
-def render_panels(panels: Sequence[Panel], suffix: str) -> bytes:
-    """Bytes of one figure with the panels below each other; ``suffix`` one of `FORMATS`."""
+def render_panels(panels: Sequence[Panel], suffix: str, language: str = ENGLISH) -> bytes:
+    """Bytes of one figure with the panels below each other; ``suffix`` one of `FORMATS`; errors as ``word_table``."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH, sum(panel.height for panel in panels)), layout="constrained")
         FigureCanvasAgg(figure)
@@ -39,6 +41,7 @@ def render_panels(panels: Sequence[Panel], suffix: str) -> bytes:
             if len(panels) > 1:
                 part.suptitle(panel.caption, x=0.01, ha="left", fontsize=9.5, fontweight="bold")
             panel.draw(part)
+        translate_figure(figure, language)
         buffer = io.BytesIO()
         figure.savefig(buffer, format=suffix, dpi=150, metadata=METADATA[f".{suffix}"])
     return buffer.getvalue()

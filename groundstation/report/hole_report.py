@@ -12,8 +12,8 @@ import numpy as np
 
 from groundstation.report.column_report import CONFIDENCE, ReportSite
 from groundstation.report.document import AS_BUILT, Document, Origin, ReportSection
+from groundstation.report.figure_words import svg_in
 from groundstation.report.plots import survey_figure
-from groundstation.report.style import svg_of
 from groundstation.report.word_tables import NOT_STATED
 from groundstation.survey.requests.site_place import site_words
 from groundstation.survey.wall.column_deviation import NORMAL_95
@@ -49,7 +49,7 @@ def hole_report(answer: SurveyAnswer, papers: HolePapers, origin: Origin) -> Doc
         ReportSection("Instrument", facts=_instrument(answer, papers)),
         ReportSection("What the ± contains", _contained(result), **_sources(result)),
         ReportSection("Stations", **_stations(answer)),
-        ReportSection("Plan and sections", figure=svg_of(figure), new_page=True),
+        ReportSection("Plan and sections", figure=svg_in(figure, origin.papers.language), new_page=True),
     ]
     facts = [*site.facts(), ("Site", site_words(result["site"]).removeprefix("site: ")), *_times(answer)]
     return Document(

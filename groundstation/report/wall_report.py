@@ -17,9 +17,9 @@ from groundstation.report.document import (
     ReportSection,
     report_pdf,
 )
+from groundstation.report.figure_words import svg_in
 from groundstation.report.plane_words import name_axes
 from groundstation.report.plots_wall import wall_figure
-from groundstation.report.style import svg_of
 from groundstation.report.word_tables import NOT_STATED
 from groundstation.survey.wall.column_errors import survey_errors
 from groundstation.survey.wall.column_state import ColumnState
@@ -137,6 +137,7 @@ def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
     extra = dict(judgement.extras).get(joint)
     words = name_axes(wall.built.frame)
     picture = wall_figure(wall.built.columns, judgement.joints, file.thickness, extra, title, words=words)
+    drawn = svg_in(picture, origin.papers.language)
     sections = [
         ReportSection("Reasons", [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings] or ["None."]),
         ReportSection("What is to be done", remedy_lines(wall, judgement) or ["Nothing."]),
@@ -145,7 +146,7 @@ def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
         _joints_section(wall, judgement),
         *_voids_sections(wall, judgement),
         *_closing_sections(wall),
-        ReportSection("Joints over depth, plan, and the worst joint", figure=svg_of(picture), new_page=True),
+        ReportSection("Joints over depth, plan, and the worst joint", figure=drawn, new_page=True),
     ]
     good = judgement.verdict is WallVerdict.TIGHT
     verdict = f"The wall is {WORDS[judgement.verdict]}"

@@ -61,14 +61,14 @@ def test_a_seed_with_seams_repeats_and_is_another_than_without() -> None:
     assert first == second
     assert first.seams
     assert first.pairs
-    seeds = range(9_200_001, 9_200_004)
+    seeds = range(9_200_001, 9_200_003)
     with_and_without = [[run_seed(seed, kinds=kinds, has_seams=has).told for seed in seeds] for has in (True, False)]
     assert with_and_without[0] != with_and_without[1]
 
 
 @pytest.mark.parametrize(
     ("first", "count"),
-    [pytest.param(9_210_000, 6, marks=pytest.mark.slow), pytest.param(9_210_006, 400, marks=pytest.mark.statistical)],
+    [pytest.param(9_210_000, 3, marks=pytest.mark.slow), pytest.param(9_210_003, 400, marks=pytest.mark.statistical)],
 )
 def test_seeds_with_seams_hold(first: int, count: int) -> None:
     jobs = [

@@ -15,7 +15,7 @@ PLAN = "calmed"
 
 @pytest.mark.parametrize(
     ("first", "count"),
-    [pytest.param(9_100_000, 8, marks=pytest.mark.slow), pytest.param(9_100_008, 400, marks=pytest.mark.statistical)],
+    [pytest.param(9_100_000, 4, marks=pytest.mark.slow), pytest.param(9_100_004, 400, marks=pytest.mark.statistical)],
 )
 def test_a_minute_after_the_last_fault_all_is_well(first: int, count: int) -> None:
     failed = [one for seed in range(first, first + count) if (one := judge_seed(SeedJob(seed, plan=PLAN))).violations]
@@ -27,7 +27,7 @@ def test_a_minute_after_the_last_fault_all_is_well(first: int, count: int) -> No
     ("seed", "kinds"),
     [
         (9000006, ("database-deleted",)),  # each gap of the numbers waited for half a minute, one after the other
-        (9000000, ("folders-swapped",)),  # each tube went on with the other's memory, whose messages nobody receipted
+        (9000000, ("folders-swapped",)),  # each tube sent the other's messages for ever
         (9000034, ("encoder-cut", "reordering")),
     ],
 )

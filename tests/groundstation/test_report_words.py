@@ -15,10 +15,12 @@ from test_reports import DAY, write_wall
 from borechain import api
 from borechain.cli.report_options import LANGUAGES
 from groundstation.errors import SurveyError
+from groundstation.report import figure_panels, figure_words
 from groundstation.report.calibrations.calibration_request import AttitudesRequest, TurntableRequest
 from groundstation.report.certificate import Identity, template_data, typeset_png_pages
 from groundstation.report.column_report import column_report
 from groundstation.report.document import Document, Origin, ReportPapers, document_content, report_pages, report_pdf
+from groundstation.report.figure_words import translate_figure
 from groundstation.report.hole_report import HolePapers, hole_report
 from groundstation.report.plots_wall import draw_wall
 from groundstation.report.wall_report import column_records, site_of, wall_report
@@ -44,6 +46,8 @@ NAMES = {
 }  # fmt: skip
 UNITS = r"[\W\d_]*(\b(m|mm|deg|azi|incl|N|E|s|MD|sigma)\b[\W\d_]*)*"
 NO_WORD = re.compile(UNITS + r"|[0-9a-f]{64}|[A-Z]+(-[A-Z]+)?|[PRKD]-?\d+.*|[\d.]+ .{1,5}|[-+−]?[xyz]|[\d.e−-]+")
+
+DRAWN = re.compile(r"\$.*\$|rms [\d.e-]+ \S+|K7|P\d\d")  # ticks, and what is the same in every language
 
 
 def origin_in(language: str) -> Origin:
@@ -116,15 +120,39 @@ def test_no_title_of_a_picture_is_cut(tmp_path: Path) -> None:
         assert extent.y1 <= figure.bbox.y1
 
 
+def said_in(made: Any, language: str) -> tuple[list[str], list[str]]:
+    """Every text of the reports and certificates, and every text inside their pictures."""
+    drawn: list[str] = []
+
+    def keep(figure: Any, language: str) -> Any:
+        said = translate_figure(figure, language)
+        drawn.extend(text.get_text() for text in said.findobj(Text))
+        return said
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (figure_words, figure_panels):
+            patch.setattr(module, "translate_figure", keep)
+        said = [text for one in made(language) for text in texts(document_content(one))]
+        said += [text for one in certificates(language) for text in texts(one)]
+    return said, drawn
+
+
+@pytest.fixture(scope="module")
+def in_english(made: Any) -> tuple[list[str], list[str]]:
+    return said_in(made, "en")
+
+
 @pytest.mark.parametrize("language", OTHERS)
-def test_no_english_phrase_is_left(made: Any, language: str) -> None:
-    english = [text for one in made("en") for text in texts(document_content(one))]
-    other = [text for one in made(language) for text in texts(document_content(one))]
-    english += [text for one in certificates("en") for text in texts(one)]
-    other += [text for one in certificates(language) for text in texts(one)]
+def test_no_english_phrase_is_left(made: Any, in_english: tuple[list[str], list[str]], language: str) -> None:
+    (english, drawn), (other, drawn_other) = in_english, said_in(made, language)
     assert len(english) == len(other)
     left = {a for a, b in zip(english, other, strict=True) if a == b} - NAMES - set(SAME[language].split())
     assert {text for text in left if not NO_WORD.fullmatch(text)} == set()
+    assert {"Plan", "Worst joints", "design axis", "residual, deg/s"} < set(drawn)
+    left = {a for a, b in zip(drawn, drawn_other, strict=True) if a == b} - NAMES
+    assert {text for text in left if not (NO_WORD.fullmatch(text) or DRAWN.fullmatch(text))} == set()
+    for a, b in zip(drawn, drawn_other, strict=True):
+        assert sorted(re.findall(r"\d[\d.]*\d|\d", a)) == sorted(re.findall(r"\d[\d.]*\d|\d", b)), (a, b)
 
 
 @pytest.mark.parametrize("language", OTHERS)

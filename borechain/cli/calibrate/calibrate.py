@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from borechain.cli.calibrate.accuracy_command import accuracy
+from borechain.cli.calibrate.apply_command import apply
 from borechain.cli.calibrate.linear import attitudes, turntable
 from borechain.cli.calibrate.mwd import magnetometer, mwd, qc
 from borechain.cli.calibrate.record_reader import record_reader
@@ -27,5 +28,5 @@ def calibrate() -> None:
     """
 
 
-for command in (turntable, attitudes, mwd, magnetometer, qc, record_reader, rests, temperature, accuracy):
+for command in (turntable, attitudes, mwd, magnetometer, qc, record_reader, rests, temperature, accuracy, apply):
     calibrate.add_command(command)

@@ -148,7 +148,8 @@ def run_seeds(request: GauntletRequest, *, as_json: bool) -> None:
     """
     from borechain.gauntlet.gauntlet_run import judge_seeds
 
-    numbers, failed, cpu_s, pairs = request.numbers, 0, 0.0, set[Pair]()
+    numbers, failed, cpu_s = request.numbers, 0, 0.0
+    pairs: set[Pair] = set()
     for outcome in judge_seeds(request.to_jobs()):
         failed += bool(outcome.violations)
         cpu_s += outcome.cpu_s
