@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from node.firmware.event_table import EVENT_TABLE, take_events
 from node.firmware.imu_settings import ImuSettings
@@ -232,3 +233,25 @@ def test_the_code_is_told(code: Code, monkeypatch: pytest.MonkeyPatch) -> None:
     assert line.name in bench.names
     given = next(arguments for number, arguments in told if number == code)
     assert set(given) <= {name for name, _ in line.arguments} or line.words is not None
+
+
+@pytest.mark.parametrize("rate", [FAST, -FAST, 0.5 * FAST])
+def test_exchanged_axes_are_told_whichever_way_the_string_turns(rate: float) -> None:
+    assert "axes_exchanged" in known().cycles(40, rate, spoil=exchanged).names
+
+
+@pytest.mark.parametrize("towards_deg", range(0, 360, 45))
+@pytest.mark.parametrize("off_deg", [0.5, 8.0])
+def test_a_mount_that_leans_is_no_exchange_of_axes(off_deg: float, towards_deg: float) -> None:
+    """Along x = y it is its own mirror, in force and rate, and it may be larger than the hole leans."""
+    towards = towards_deg * DEG
+    mount = Rotation.from_rotvec(off_deg * DEG * np.array([-math.sin(towards), math.cos(towards), 0.0]))
+
+    def leaning(w: Numbers, f: Numbers) -> tuple[Numbers, Numbers]:
+        rate, force = mount.apply([w, f]).tolist()
+        return tuple(rate), tuple(force)
+
+    bench = Bench().cycles(LEARN, spoil=leaning)
+    for rate in (FAST, 0.5 * FAST, -FAST):
+        bench.cycles(40, rate, leaning).cycles(12, spoil=leaning)
+    assert "axes_exchanged" not in bench.names

@@ -1,4 +1,4 @@
-"""Kinds of blunders, each in three sizes: what becomes of the scenario of a rig, and by which name it is to be found.
+"""Kinds of blunders in three sizes: what becomes of the scenario of a rig, and by which name it is to be found.
 
 What is told of north and of the stick-up is in no reading, or hardly: all are the same, or are moved alike, whatever is
 so. A crew checks it by a second reading, which errs as the first may; where it does not, it is told that nothing does.
@@ -31,7 +31,7 @@ class PlantedBlunder:
     Attributes
     ----------
     name, unit : in words, and of its sizes
-    sizes : three, the smallest first
+    sizes : three, the smallest first; one of what is not told at all, which has no size
     change : the scenario of a rig with it
     named : what the adjustment may call it, see ``groundstation.survey.adjustment``
     seen_by : the check by which alone it is seen, where it is in no reading
@@ -39,7 +39,7 @@ class PlantedBlunder:
 
     name: str
     unit: str
-    sizes: tuple[float, float, float]
+    sizes: tuple[float, ...]
     change: Change
     named: tuple[str, ...] = ()
     seen_by: str = ""
@@ -181,7 +181,7 @@ KINDS: Final[tuple[PlantedBlunder, ...]] = (
         of_told(lambda deg: {"joint_tube": TUBES, "drive_deg": deg}), JOINT,
     ),
     PlantedBlunder(
-        "joints untold", "", (0.0, 1.0, 2.0),
+        "joints untold", "", (0.0,),
         of_section("setup", lambda _: {"untold": ("joints",)}), JOINT,
     ),
     PlantedBlunder("north wrong", "deg", (0.2, 1.0, 90.0), north_told, (K.COLLAR_WRONG,)),
@@ -189,7 +189,7 @@ KINDS: Final[tuple[PlantedBlunder, ...]] = (
         "north wrong and unchecked", "deg", (0.2, 1.0, 90.0), leave_unchecked("north", north_told), (K.COLLAR_WRONG,)
     ),
     PlantedBlunder(
-        "north untold", "", (0.0, 1.0, 2.0), of_section("setup", lambda _: {"untold": ("north",)}), JOINT
+        "north untold", "", (0.0,), of_section("setup", lambda _: {"untold": ("north",)}), JOINT
     ),
     PlantedBlunder(
         "collar wrong", "deg", (0.5, 2.0, 8.0), of_told(lambda deg: {"collar_north_deg": deg}),
@@ -200,7 +200,7 @@ KINDS: Final[tuple[PlantedBlunder, ...]] = (
         "stick-up told too high and unchecked", "m", (0.02, 0.3, 2.0), leave_unchecked("stick-up", stick_up_told), DEPTH
     ),
     PlantedBlunder(
-        "collar untold", "", (0.0, 1.0, 2.0),
+        "collar untold", "", (0.0,),
         of_section("setup", lambda _: {"untold": ("collar",)}),
     ),
     PlantedBlunder(

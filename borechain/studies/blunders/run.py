@@ -112,7 +112,7 @@ def blunder_row(kind: PlantedBlunder, size: int, runs: Sequence[BlunderRun]) -> 
     on_target = sum(run.answer.word == "on_target" for run in beyond)
     return {
         "case": kind.name,
-        "size": f"{kind.sizes[size]:g} {kind.unit}".strip(),
+        "size": f"{kind.sizes[size]:g} {kind.unit}".strip() if len(kind.sizes) > 1 else "",
         "rigs": len(runs),
         **{name: counts[name] for name in ("named", "doubted", "below", "unseen", "missed")},
         "beyond_on_target": on_target,

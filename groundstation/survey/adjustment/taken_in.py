@@ -45,7 +45,7 @@ Array = npt.NDArray[np.float64]
 WIDE_FORCE, WIDE_TILT, WIDE_TURN, WIDE_DEPTH = 1.0, 0.2, 3.0, 10.0  # m/s^2, rad, rad, m before a blunder is found
 BENT = (*BY_DEPTH, *BY_TILT, BlunderKind.HOLE_MOVED)  # whose columns are others once the hole stands right
 NOT_SOUGHT = (*KNOWN_SIZE, BlunderKind.COLLAR_WRONG)  # put right in the looks, and left open in the path
-ROUNDS = 4
+ROUNDS = 16  # a turn of 60 deg takes six
 SETTLED, STRAIGHT = 0.1, 0.01  # standard deviations, and rad or m, of a turn or depth that is found in addition
 
 

@@ -6,6 +6,10 @@ degrees. At rest nothing shows it. While the string turns gravity goes around in
 force across the axis and p that which the gyroscope has turned along, both as complex numbers, z = p, and of exchanged
 axes z = i conj(p), which goes around the other way. So Im(z p) has the mean |p|^2 of exchanged axes, and none else.
 
+A mount that leans and a bias stay where they are in the tube, in the force and, since the node levels itself by it, in
+the direction too; where they lie along the mirror's own axis, x = y, they look like exchanged axes. So p is made of how
+that direction changes over a cycle, dp = -2i sin(turn / 2) p, in which nothing is that stays.
+
 They are taken for exchanged where that mean explains 0.8 of the force across: vibration, however strong, is not alike
 the gyroscope's turn over twelve cycles. The node exchanges them back, and says so.
 """
@@ -16,7 +20,7 @@ from typing import Any, Final
 
 from node.kernels.arithmetic.formats import DEG
 from node.kernels.arithmetic.jit import kernel, kernel_constant
-from node.kernels.arithmetic.operations import bounded_ratio, half_of, mean_of_total, times_factor
+from node.kernels.arithmetic.operations import bounded_ratio, mean_of_total, times_factor
 from node.kernels.arithmetic.quantity import NONE, factor_quantity, rate_quantity
 from node.kernels.record.events import Code, queue_event
 
@@ -40,7 +44,9 @@ def watch_axes(node: Any, settings: Any) -> None:
     """Take the cycle in that the filter has just had. Of several IMUs the others tell which one is wrong."""
     state, mirror, gravity = node.filter, node.guard.mirror, node.config.gravity
     down = state.now_down
-    x, y = half_of(mirror.down[0] + down[0]), half_of(mirror.down[1] + down[1])
+    x, y = mirror.down[1] - down[1], down[0] - mirror.down[0]  # i dp
+    if state.now_rate < 0:
+        x, y = -x, -y
     mirror.down[0], mirror.down[1] = down[0], down[1]
     u, v = -bounded_ratio(node.force[0], gravity), -bounded_ratio(node.force[1], gravity)
     is_plain = node.guard.force.fault == 0 and abs(u) <= LARGEST and abs(v) <= LARGEST

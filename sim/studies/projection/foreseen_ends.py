@@ -85,12 +85,13 @@ def _from_station(
     foreseen = project_to_target(known, direction, tendency, design)
     mean = foreseen.ends.offset
     radius = foreseen.foreseen.radius_of(0.95, mean)
+    is_reached = foreseen.chance_within(float(np.hypot(*end))) <= DEADLINE  # one chance; the distance of one takes 17
     chances = [foreseen.chance_within(limit) for limit in LIMITS]
     straight, constant = simple_guesses(tangents, md, point, design)
     return (
         bool(np.hypot(*(end - mean)) <= radius), radius, end - mean, score_forecast(foreseen.foreseen, end),
         np.abs(end - straight).mean(), np.abs(end - constant).mean(),
-        bool(np.hypot(*end) <= foreseen.distance_of(DEADLINE)), chances,
+        is_reached, chances,
     )  # fmt: skip
 
 

@@ -269,6 +269,22 @@ def test_without_a_blunder_it_is_the_plain_adjustment(honest: DrawnString) -> No
     assert not is_suspicious(plain, honest.run)
 
 
+@pytest.mark.parametrize("deg", [8.0, 60.0, -100.0, 170.0])
+def test_a_turn_of_any_size_leaves_the_hole_as_it_was(honest: DrawnString, deg: float) -> None:
+    """A turn is not linear: sought until it is found, the hole is that of the same looks without it."""
+    looks = honest.looks
+    one = Hypothesis(K.ENCODER_SLIPPED, (), 6)
+    yaw = looks.yaw + np.where(looks.stop >= 6, deg * DEG, 0.0)
+    without, with_it = (
+        adjust_with(replace(looks, yaw=y), honest.string, honest.path, honest.run, [one]) for y in (looks.yaw, yaw)
+    )
+    off = (with_it.sizes[0] - without.sizes[0] - deg * DEG + np.pi) % (2.0 * np.pi) - np.pi
+    assert abs(off[0]) < 0.1 * np.sqrt(without.covs[0][0, 0])
+    moved = (with_it.found.now.tangents - without.found.now.tangents)[:, :2]
+    stated = np.sqrt(np.einsum("kaa->k", without.found.covs[:, :2, :2]))
+    assert (np.linalg.norm(moved, axis=1) < 0.1 * stated).all()
+
+
 def test_a_blunder_that_was_put_in_comes_out_linearly(honest: DrawnString) -> None:
     """A step of any size: the hole as without it, and the step as it was put in, by the same noise."""
     looks = honest.looks
