@@ -74,6 +74,7 @@ OWN_FORMATS: Final[dict[str, Any]] = {
     "mirror.down": VECTOR_Q,
     "creep.bias": RATE_Q,
     "creep.bias_var": RATE_VAR_Q,
+    "constant_var": RATE_VAR_Q,
     "wander": RATE_Q,
     "decay": VECTOR_Q,
     "decays": VECTOR_Q,

@@ -112,6 +112,7 @@ CREEP: Final = np.dtype(
         ("bias", "f8", (3,)),  # rad/s, constant part of it, when the string came to rest
         ("wander", "f8", (3,)),  # rad/s, part of it that wanders, then
         ("bias_var", "f8", (3,)),  # (rad/s)^2, of both; 0: not known
+        ("constant_var", "f8", (3,)),  # (rad/s)^2, of the constant part
         ("decay", "f8"),  # of the part that wanders, what is left of it
         ("decays", "f8"),  # sum of that over the cycles
         ("angle", "f8", (3,)),  # rad, by which the string has turned since, if it did

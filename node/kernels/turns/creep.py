@@ -4,9 +4,10 @@ A string that runs on into its play, unwinds or creeps turns while the encoder s
 filter takes whatever its gyroscope shows for the bias, so the turn goes there. Here the rates of a rest are summed up
 beyond the bias of before it,
 
-    A = sum (w - b) T,    var A = t^2 (f^2 P_b + h sigma_b^2 + N^2 / t),
+    A = sum (w - b) T,    var A = t^2 (f^2 P_b + (1 - f)^2 P_c + h sigma_b^2 + N^2 / t),
 
-with P_b the variance of the bias b as the string came to rest, of which the part that wanders decays, and N the noise.
+with P_b the variance of the bias b as the string came to rest, of which the part that wanders decays, P_c that of its
+constant part, which b becomes, and N the noise.
 Of a Gauss-Markov bias f = (1 - e^-x) / x, and h = 2 / x - (3 - 4 e^-x + e^-2x) / x^2 with x = t / tau, which is x / 2.1
 but for 0.04, at most 3/8. Where A is beyond that it is in doubt whether the string turned: its square, times the chance
 that it did, is systematic variance of the yaw, of which the end of every rest leaves half. Of z sigmas that chance is
@@ -69,6 +70,7 @@ UNCERTAIN: Final = 6  # squares of sigmas that show nothing
 TOLD: Final = 9  # sigmas of one that is told: a scale that was learnt wrongly leaves a bias that is eight of them off
 BEYOND: Final = 3  # sigmas, of what is not noise
 RADIAN: Final = angle_quantity(1.0)
+ALONE: Final = 2  # sigmas, within which the other axes leave a turn of less than ``SHOWN`` to the string
 LEAST_LEAN: Final = factor_quantity(0.5 * DEG)  # sine of the lean, from where there is a tool face
 LEAST_SQUARE: Final = factor_quantity((0.5 * DEG) ** 2)  # its square
 UNSEEN: Final = factor_quantity(1.9)  # rad, standard deviation of a tool face that tells nothing
@@ -89,7 +91,7 @@ def follow_creep(node: Any, settings: Any) -> None:
         creep.waits = 1
         return
     take_cycle(node, (state.cycles - 2) % RING)
-    if has_sensor_moved(node):
+    if has_sensor_moved(node, BEYOND):
         if abs(creep.angle[2]) > LEAST_SHOWN * turn_std(node, 2):  # what it had shown before they moved stays
             withdraw_doubt(node)
     elif 1 < creep.cycles < LONGEST:
@@ -130,6 +132,7 @@ def remember_biases(state: Any, creep: Any) -> None:
     for k in range(3):
         creep.bias[k], creep.wander[k] = state.static_bias[k], state.bias[k]
         creep.bias_var[k] = state.P[BX + k, BX + k] if state.mode != STATIC_BIAS else 0
+        creep.constant_var[k] = state.static_bias_var[k]
         creep.angle[k] = 0
     creep.decay, creep.decays = ONE, 0
 
@@ -164,19 +167,21 @@ def turn_std(node: Any, k: int) -> float:
     config, creep = node.config, node.guard.creep
     time = time_of_cycles(node.filter.now, creep.cycles)
     f = mean_of_total(creep.decays, creep.cycles)
+    gone = ONE - f
     known = times_factor(creep.bias_var[k], times_factor(f, f))
+    known += times_factor(creep.constant_var[k], times_factor(gone, gone))
     wander = mean_of_total(bias_var(config, k), WANDERS) * min(creep.cycles, WANDERED)
     var = bounded_variance(known + wander + noise_over(config, k, 1, time))
     return turned_angle(angular_root(var), time)
 
 
 @kernel
-def has_sensor_moved(node: Any) -> bool:
+def has_sensor_moved(node: Any, sigmas: int) -> bool:
     """Whether the gyroscope shows a turn across the axis too, which a string does not make: its biases have moved."""
     creep = node.guard.creep
     moved = 0
     for k in range(2):
-        moved += 1 if abs(creep.angle[k]) > BEYOND * turn_std(node, k) else 0
+        moved += 1 if abs(creep.angle[k]) > sigmas * turn_std(node, k) else 0
     return moved > 0
 
 
@@ -191,7 +196,7 @@ def judge_turn(node: Any, settings: Any) -> None:
             withdraw_doubt(node)
             return
         take_witness(node, std, abs(felt), felt_std)
-    if angle > LEAST_SHOWN * std:
+    if angle > SHOWN * std or (angle > LEAST_SHOWN * std and not has_sensor_moved(node, ALONE)):
         doubt_turn(node, angle, turned_chance(angle, std))
     if creep.doubted == 1 and angle > TOLD * std and creep.cycles >= 2 * QUICK:
         creep.doubted = 2

@@ -56,7 +56,7 @@ def guard_reading(node: Any, settings: Any, saturated: int, at: float) -> None:
     known = abs(at - guard.rate_at) <= RATE_AGE
     measured = true_rate(turning[2] - state.static_bias[2] - state.bias[2], state.scale)
     if gyro == 0:
-        watch_ratio(node, turning[2] - state.static_bias[2] - state.bias[2], at)
+        watch_ratio(node, turning[2], at)
     if gyro == 0 and is_faulty(guard.gyro) and known and abs(measured - guard.rate) > CREDIBLE:
         gyro = guard.gyro.fault
     follow_gyro(node, gyro)

@@ -15,6 +15,7 @@ from node.kernels.arithmetic.jit import kernel, kernel_constant
 from node.kernels.arithmetic.operations import (
     angular_square,
     bounded_ratio,
+    bounded_variance,
     half_of,
     is_number,
     scale_square,
@@ -51,6 +52,7 @@ def learn_mismatch(node: Any) -> None:
     state, config, guard = node.filter, node.config, node.guard
     trust, found = guard.gyro, guard.found
     reassign_step_to_scale(node)
+    apart = abs(state.innovation + guard.last_jump)
     explain_jump(node)
     explain_ramp(guard.ramp)
     prior = max(bias_var(config, 2) + state.static_bias_var[2], LEARNT_VAR)
@@ -67,7 +69,7 @@ def learn_mismatch(node: Any) -> None:
         state.static_bias[2] -= found.rate
         guard.unproven = max(guard.unproven, min(abs(found.rate), UNWINDING))
         if abs(found.rate) <= UNWINDING:
-            guard.disputed = max(guard.disputed, abs(state.innovation))
+            guard.disputed = max(guard.disputed, apart)
         prior += angular_square(times_factor(found.rate, UNSURE))
     take_mismatch(state, prior, of_scale)
     state.rejected = 0
@@ -95,6 +97,17 @@ def doubt_step(node: Any, period: float) -> None:
     if age > 2 * period:
         before = angular_square(turned_angle(rate, age - period))
         open_yaw(state, angular_square(turned_angle(rate, age)) - before)
+
+
+@kernel
+def settle_dispute(node: Any, is_strings: int) -> None:
+    """A rest has shown whose a step was: the gyroscope's, or the string's, whose twist stays in doubt."""
+    state, guard, ramp = node.filter, node.guard, node.guard.ramp
+    apart = angular_square(guard.disputed)
+    kept = bounded_variance(max(ramp.doubt, apart)) if is_strings == 1 else ramp.doubt
+    state.systematic_var = bounded_variance(max(state.systematic_var + kept - ramp.doubt - apart, 0))
+    ramp.doubt = kept
+    guard.unproven, guard.disputed = 0, 0
 
 
 @kernel

@@ -32,6 +32,7 @@ from node.kernels.filter.priors import bias_var, calm_bias, noise_over, widen_bi
 from node.kernels.filter.resets import doubt_yaw, move_bias
 from node.kernels.record.events import Code, event_degrees, queue_event
 from node.kernels.record.filter_record import RING
+from node.kernels.turns.mismatches import settle_dispute
 from node.kernels.turns.sensor_trust import is_faulty
 
 CYCLES: Final = 8  # whose mean and spread are looked at
@@ -61,7 +62,7 @@ def watch_rest(node: Any, settings: Any, at: float) -> None:
         if not is_tilting(state, node.config):
             take_bias(node, settings, since)
     else:
-        guard.unproven, guard.disputed = 0, 0
+        settle_dispute(node, 0)
         if since == CYCLES:
             calm_down(node, settings)
 
@@ -195,8 +196,7 @@ def take_bias(node: Any, settings: Any, since: int) -> None:
     state.rejected = 0
     guard.before_steps = NONE
     guard.step.fault = 0
-    guard.ramp.doubt = bounded_variance(max(guard.ramp.doubt, angular_square(guard.disputed)))
-    guard.unproven, guard.disputed = 0, 0
+    settle_dispute(node, 1)
     queue_event(node, BIAS_MOVED, event_degrees(moved_z, RATE_Q), NONE, NONE, NONE)
 
 

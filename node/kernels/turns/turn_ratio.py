@@ -17,7 +17,7 @@ from typing import Any, Final
 
 from node.kernels.arithmetic.formats import DEG, RATE_Q, VECTOR_Q
 from node.kernels.arithmetic.jit import kernel, kernel_constant
-from node.kernels.arithmetic.operations import angular_root, bounded_ratio, factor_of, time_of_cycles
+from node.kernels.arithmetic.operations import angular_root, bounded_ratio, factor_of, is_number, time_of_cycles
 from node.kernels.arithmetic.quantity import NONE, ONE, factor_quantity, rate_quantity
 from node.kernels.filter.modes import STATIC_BIAS
 from node.kernels.filter.priors import scale_var
@@ -43,11 +43,15 @@ def ratio_var(node: Any) -> float:
 
 
 @kernel
-def watch_ratio(node: Any, shown: float, at: float) -> None:
-    """Compare the encoder's word with the rate ``shown`` (rad/s, without its bias) in a cycle that ended ``at`` (s)."""
+def watch_ratio(node: Any, rate: float, at: float) -> None:
+    """Compare the encoder's word with a ``rate`` (rad/s) of the gyroscope, in a cycle that ended ``at`` (s).
+
+    A step that its bias has taken since may be this ratio, so the bias is that of before.
+    """
     guard, ratio = node.guard, node.guard.ratio
     if ratio.told == 1 or ratio.agreed >= ENOUGH:
         return
+    shown = rate - (guard.before_steps if is_number(guard.before_steps) else node.filter.static_bias[2])
     one, other = abs(guard.rate), abs(shown)
     is_fast = max(one, other) >= FASTER and min(one, other) >= SLOWER
     is_told = abs(at - guard.rate_at) <= time_of_cycles(at, FRESH) and (guard.rate < 0) == (shown < 0)
