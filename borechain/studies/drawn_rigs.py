@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -115,11 +115,6 @@ def drawn_rigs(known: KnownSetUp, seeds: int, first: int = 1, *, stops_anywhere:
     """Rigs of as many numbers from the first on, the kinds of holes in turn."""
     numbers = range(first, first + seeds)
     return [RigDraw(known, seed, HOLE_KINDS[seed % len(HOLE_KINDS)], stops_anywhere) for seed in numbers]
-
-
-def play_as(known: KnownSetUp, play_deg: float) -> KnownSetUp:
-    """The same with another play of the tubes in the hole."""
-    return replace(known, play_deg=play_deg)
 
 
 def change_tables(tables: Tables, **sections: dict[str, Any]) -> Tables:

@@ -16,7 +16,7 @@ from groundstation.survey.bearings import wrap_angle
 from groundstation.survey.fusion.fusion import Weighting
 from groundstation.survey.fusion.resolve import direction_angles, resolve_direction
 from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR, stds_of_directions
-from groundstation.survey.fusion.survey_trust import EFFECTS, trust_of, with_unknown_yaw
+from groundstation.survey.fusion.survey_trust import EFFECTS, trust_of, with_yaws_of
 from groundstation.survey.fusion.trust_level import Trust
 from telemetry.frozen import replace
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
@@ -128,7 +128,8 @@ def test_a_further_flag_never_gains_trust(one: int, other: int) -> None:
 @given(st.floats(-180.0, 180.0), st.floats(0.01, 179.0))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_whatever_the_yaw_is_the_truth_is_within_the_uncertainty(yaw_error_deg: float, inclination_deg: float) -> None:
-    seen = with_unknown_yaw(resolve_direction(force_at(inclination_deg), np.array(COV), yaw_error_deg * DEG, 1e-8))
+    known = resolve_direction(force_at(inclination_deg), np.array(COV), yaw_error_deg * DEG, 1e-8)
+    seen = with_yaws_of(known, UNKNOWN_YAW_VAR)
     inclination, azimuth = direction_angles(seen.direction.lean, seen.direction.down)
     ((inclination_std, azimuth_std),) = stds_of_directions([seen.direction])
     assert abs(inclination - inclination_deg * DEG) < inclination_std

@@ -5,7 +5,6 @@ Frame and units as in ``looks``: SI and radians.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,27 +62,3 @@ class RunOfStops:
     time: Array
     station_md: Array
     causes: TurnCauses
-
-
-def chain_causes(
-    from_bit: Sequence[int], make_up_sizes: Sequence[int], joint_std: float, mount_std: float, north_std: float
-) -> TurnCauses:
-    """Causes of a plain chain that grows on top: a joint turns what lies below it once it is made, a mount its tube.
-
-    The zero of the encoder against north turns all.
-
-    Parameters
-    ----------
-    from_bit : tubes in their order from the bit up
-    make_up_sizes : (u,) how many tubes the string had at each make-up
-    joint_std, mount_std, north_std : rad
-    """
-    count, sizes = len(from_bit), np.asarray(make_up_sizes)
-    places = np.argsort(from_bit)
-    joints = np.arange(1, count)[:, None]  # the one below the tube at that place
-    # together, of a look of the tube at place a with b tubes in the string: 1 where a < joint < b
-    of_tubes = [np.where(places >= joints, -1.0, 0.0), np.eye(count), np.ones((1, count))]
-    of_make_ups = [np.where(sizes > joints, 1.0, 0.0), np.zeros((count + 1, len(sizes)))]
-    names = [*((JOINT, tube) for tube in from_bit[:-1]), *((MOUNT, tube) for tube in range(count)), (NORTH, -1)]
-    stds = np.array([joint_std] * (count - 1) + [mount_std] * count + [north_std])
-    return TurnCauses(tuple(names), np.concatenate(of_tubes), np.concatenate(of_make_ups), stds)

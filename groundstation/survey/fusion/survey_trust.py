@@ -50,11 +50,6 @@ def trust_of(flags: NodeFlag) -> Trust:
     return max([Trust.FULL, *effects, *([STRANGE] if strange else [])])
 
 
-def with_unknown_yaw(resolved: Resolved) -> Resolved:
-    """The same stop with the covariance of a direction whose azimuth is not known."""
-    return with_yaws_of(resolved, UNKNOWN_YAW_VAR)
-
-
 def with_trusts(resolved: Resolved, trusts: Sequence[int]) -> Resolved:
     """Many stops (n), the yaws of some of which are not known by their trust."""
     return with_yaws_of(resolved, UNKNOWN_YAW_VAR * (np.array(trusts) == Trust.UNKNOWN_YAW))

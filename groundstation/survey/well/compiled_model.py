@@ -168,11 +168,12 @@ _held: dict[tuple[SurveyTool, bool], CompiledModel] = {}
 def _model(tool: SurveyTool, *, by_source: bool) -> CompiledModel:
     """Model of a tool, held from its first use on."""
     key = tool, by_source
-    if key not in _held:
+    model = _held.get(key)  # once: to compare two tools goes through all their terms
+    if model is None:
         if len(_held) == HELD:
             del _held[next(iter(_held))]
-        _held[key] = CompiledModel(tool, by_source=by_source)
-    return _held[key]
+        model = _held[key] = CompiledModel(tool, by_source=by_source)
+    return model
 
 
 def preload_models(names: Sequence[str] = COMPILED_BEFORE) -> None:
