@@ -64,3 +64,8 @@ def test_a_node_of_one_imu_fits_a_small_chip(tmp_path: Path) -> None:
     sizes = dict(line.split() for line in lines)
     assert int(sizes["flash_bytes"]) <= 115_000
     assert int(sizes["data_bytes"]) + int(sizes["zeroed_bytes"]) + int(sizes["records_bytes"]) <= 17_500
+    page = (Path(__file__).parents[1] / "docs" / "board.md").read_text()
+    told = re.findall(r"^\| cortex-m4 \| 1 \| ([0-9.]+) \| [0-9]+ \| ([0-9.]+) \|", page, re.MULTILINE)
+    assert told, "no row of a Cortex-M4 with one IMU: python docs/make_board.py"
+    assert float(told[0][0]) == pytest.approx(int(sizes["flash_bytes"]) / 1000, rel=0.03)  # of another gcc
+    assert float(told[0][1]) == pytest.approx(int(sizes["records_bytes"]) / 1000, abs=0.05)
