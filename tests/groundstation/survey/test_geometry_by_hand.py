@@ -1,0 +1,224 @@
+"""Voids, joints and make-ups beside rasters, closed forms and sums by hand, with sizes that all differ."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from groundstation.survey.wall.column_joint import (
+    joint_thickness,
+    limit_distances,
+    probability_beyond,
+    shift_margin,
+)
+from groundstation.survey.wall.voids import find_voids, power_centre, triples_of
+from groundstation.survey.well.depth_errors import DepthErrors
+from groundstation.survey.well.make_up_depths import (
+    MakeUpDepths,
+    learnt_reading_std,
+    make_up_depths,
+    misfit_of_depths,
+)
+
+Array = np.ndarray
+
+
+# voids
+
+
+def discs(seed: int) -> tuple[Array, Array]:
+    """A wall of columns of three sizes, one inside another, one twice, one that is not there, one that stands alone."""
+    random = np.random.default_rng(seed)
+    grid = np.stack(np.meshgrid(np.arange(6.0), np.arange(6.0)), axis=-1).reshape(-1, 2)
+    centres, radii = grid + 0.03 * random.standard_normal(grid.shape), random.choice([0.52, 0.56, 0.62], len(grid))
+    centres[9], radii[21] = math.nan, 0.17
+    centres = np.vstack([centres, centres[0], centres[3] + 0.05])
+    return centres, np.concatenate([radii, [radii[0], 0.3]])
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_voids_of_columns_of_any_size_are_those_of_a_raster(seed: int) -> None:
+    from scipy.ndimage import label
+
+    centres, radii = discs(seed)
+    step = 0.01
+    places = np.arange(-1.0, 6.0, step)
+    x, y = np.meshgrid(places, places)
+    free = np.full(x.shape, np.inf)
+    for (cx, cy), radius in zip(centres, radii, strict=True):
+        if math.isfinite(cx):
+            free = np.minimum(free, np.hypot(x - cx, y - cy) - radius)
+    parts, count = label(free > 0.0)
+    shares = [(part, parts == part) for part in range(1, count + 1) if part != parts[0, 0]]
+    rastered = sorted((inside.sum() * step**2, free[inside].max(), part) for part, inside in shares)
+    voids = sorted(find_voids(centres, radii), key=lambda one: one.area)
+    rastered, voids = [one for one in rastered if one[0] > 0.002], [one for one in voids if one.area > 0.002]
+    assert len(voids) == len(rastered) > 10
+    for void, (area, deepest, part) in zip(voids, rastered, strict=True):
+        assert void.area == pytest.approx(area, abs=1e-3 + 0.01 * area)
+        column, row = (round((at + 1.0) / step) for at in void.place)
+        assert parts[row, column] == part
+        assert void.radius == pytest.approx(free[row, column], abs=2.0 * step)
+        assert void.radius <= deepest + 2.0 * step
+        if len(void.columns) <= 8 and not void.area > 0.5:  # the deepest point of a large one may be by its island
+            assert void.radius == pytest.approx(deepest, abs=0.03)
+
+
+@pytest.mark.parametrize("turn", np.arange(0.0, 6.3, 0.7))
+def test_a_column_that_stands_free_in_a_void_takes_its_area_from_it(turn: float) -> None:
+    """Twelve columns in a ring; in it one, or a ring of six which has a void of its own with one inside."""
+    ring = turn + math.tau / 12 * np.arange(12)
+    outer = 10.0 * np.stack([np.cos(ring), np.sin(ring)], axis=1)
+    inner = 3.0 * np.stack([np.cos(ring[::2]), np.sin(ring[::2])], axis=1) + [1.0, 2.0]
+    centres, radii = outer, np.full(12, 2.8)
+    (empty,) = find_voids(centres, radii)
+    (one,) = find_voids(np.vstack([centres, [[2.0, -1.0]]]), np.append(radii, 0.7))
+    assert one.area == pytest.approx(empty.area - math.pi * 0.49)
+    (alone,) = find_voids(inner, np.full(6, 1.6))
+    nested = find_voids(np.vstack([centres, inner, [[1.0, 2.0]]]), np.concatenate([radii, np.full(6, 1.6), [0.5]]))
+    inside, outside = sorted(nested, key=lambda void: void.area)
+    assert inside.area == pytest.approx(alone.area - math.pi * 0.25)
+    lens = 2.0 * (1.6**2 * math.acos(1.5 / 1.6) - 1.5 * math.sqrt(1.6**2 - 1.5**2))
+    assert outside.area == pytest.approx(empty.area - (6.0 * (math.pi * 1.6**2 - lens) + alone.area))
+    beside = find_voids(np.vstack([centres, [[20.0, 0.0]]]), np.append(radii, 0.7))
+    assert beside[0].area == pytest.approx(empty.area)
+
+
+def test_a_power_centre_is_as_far_from_three_discs_by_their_tangents() -> None:
+    centres, radii = np.array([[[0.0, 0.0], [3.0, 0.5], [1.0, 2.5]]]), np.array([[0.4, 0.9, 0.6]])
+    (meeting,) = power_centre(centres, radii)
+    powers = np.sum((centres[0] - meeting) ** 2, axis=1) - radii[0] ** 2
+    assert powers == pytest.approx([powers[0]] * 3)
+
+
+def test_triples_are_near_each_other_all_three() -> None:
+    heads = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1.0]])
+    assert triples_of(heads, 1.5).tolist() == [[0, 1, 3], [1, 2, 3]]
+    assert triples_of(heads, 0.5).shape == (0, 3)
+
+
+# joints
+
+
+@pytest.mark.parametrize(("first", "second"), [(0.5, 0.5), (0.4, 0.7), (0.7, 0.4)])
+def test_a_joint_is_as_thick_as_the_common_chord_and_a_gap_as_wide_as_it_is(first: float, second: float) -> None:
+    for distance in (0.35, 0.6, 0.9, 1.05):
+        thick = float(joint_thickness(np.array(distance), first, second))
+        if distance >= first + second:
+            assert thick == pytest.approx(first + second - distance)
+        elif distance**2 <= abs(first**2 - second**2):
+            assert thick == pytest.approx(2.0 * min(first, second))
+        else:  # by Heron: twice the height of the triangle of the two radii
+            s = 0.5 * (first + second + distance)
+            area = math.sqrt(s * (s - first) * (s - second) * (s - distance))
+            assert thick == pytest.approx(4.0 * area / distance)
+            (limit,) = limit_distances(np.array([first]), np.array([second]), thick)
+            if limit >= math.sqrt(abs(first**2 - second**2)):
+                assert limit == pytest.approx(distance) or distance < limit
+    for one, other, required in ((0.3, 0.9, 0.7), (0.9, 0.3, 0.7), (0.0, 0.5, 0.0), (0.5, 0.0, 0.0)):
+        assert limit_distances(np.array([one]), np.array([other]), required).tolist() == [0.0]
+
+
+def test_a_shift_leaves_the_joint_just_thick_enough() -> None:
+    shift, lean = shift_margin(0.5, 0.6, 0.7, 20.0)
+    assert float(joint_thickness(np.array(0.7 + shift), 0.5)) == pytest.approx(0.6)
+    assert math.tan(lean) == pytest.approx(shift / 20.0)
+
+
+@pytest.mark.parametrize("std", [0.01, 0.1, 0.6])
+def test_the_chance_beyond_a_distance_is_that_of_the_noncentral_chi_square(std: float) -> None:
+    from scipy.stats import ncx2
+
+    for mean in ([0.0, 0.0], [0.3, -0.2], [-0.55, 0.1]):
+        found = float(probability_beyond(np.array(mean), std**2 * np.eye(2), np.array(0.6)))
+        expected = float(ncx2.sf((0.6 / std) ** 2, 2, (math.hypot(*mean) / std) ** 2))
+        assert found == pytest.approx(expected, rel=1e-6, abs=1e-14)
+
+
+@pytest.mark.parametrize("mean", [(0.0, 0.0), (0.3, -0.2), (-0.2, 0.5)])
+def test_the_chance_beyond_a_distance_of_a_long_covariance_is_that_of_a_fine_sum(mean: tuple[float, float]) -> None:
+    root = np.array([[0.25, 0.0], [0.1, 0.06]])
+    steps = (np.arange(2400) + 0.5) / 2400 * 14.0 - 7.0
+    weight = np.exp(-0.5 * steps**2) / math.sqrt(math.tau) * (14.0 / 2400)
+    x = mean[0] + root[0, 0] * steps[:, None] + root[0, 1] * steps
+    y = mean[1] + root[1, 0] * steps[:, None] + root[1, 1] * steps
+    expected = float(weight @ (np.hypot(x, y) > 0.45) @ weight)
+    found = float(probability_beyond(np.array(mean), root @ root.T, np.array(0.45)))
+    assert found == pytest.approx(expected, abs=2e-4)
+
+
+# make-ups
+
+LENGTHS = np.array([2.0, 3.0, 2.5, 3.5, 2.2, 2.8, 3.1, 2.4])
+NO_ERRORS = DepthErrors(0.0, 0.0, 0.0, 0.002)
+
+
+def depths(*steps: float, errors_at_zero: float = -0.4) -> MakeUpDepths:
+    """Make-ups of one to so many tubes, the rest of which grows by ``steps``."""
+    count = len(steps) + 1
+    reach = np.cumsum(LENGTHS)[:count]
+    return MakeUpDepths(np.arange(1, count + 1), reach + errors_at_zero + np.cumsum([0.0, *steps]), reach)
+
+
+def test_the_deepest_bit_with_each_number_of_tubes_counts() -> None:
+    found = make_up_depths(np.array([3, 1, 3, 1, 3]), np.array([7.0, 1.8, 7.3, 1.2, 6.0]), LENGTHS)
+    assert (found.tubes.tolist(), found.bit.tolist()) == ([1, 3], [1.8, 7.3])
+    assert found.reach == pytest.approx([2.0, 7.5])
+    assert found.rest == pytest.approx([-0.2, -0.2])
+
+
+def test_a_reading_scatters_as_the_steps_do_less_what_tubes_do() -> None:
+    found = MakeUpDepths(np.array([1, 3, 4]), np.array([2.0, 7.54, 11.0]), np.array([2.0, 7.5, 11.0]))
+    errors = DepthErrors(0.0, 0.0, 0.01, 0.004)
+    var = (4.0 * 0.004**2 + 0.5 * (0.04**2 - 2.0 * 0.01**2 + 0.04**2 - 0.01**2)) / 6.0
+    assert learnt_reading_std(found, errors, 3.0) == pytest.approx(math.sqrt(var))
+    assert learnt_reading_std(found, errors, 0.2) == 0.004  # of a crew that surveys anywhere
+    assert learnt_reading_std(depths(0.0, 0.0), errors, 3.0) == 0.004
+
+
+@pytest.mark.parametrize(("step", "is_told"), [(0.119, True), (0.118, False), (-0.119, True), (0.05, False)])
+def test_a_step_is_unlike_beyond_eight_times_the_others(step: float, is_told: bool) -> None:
+    """The others scatter as rigs do at least, by 1 cm and a half: eight times that are 12 cm."""
+    usual = 0.0998 / 8.0 / 1.4826 * 1.0
+    found = depths(usual, -usual, step - (0.119 - 0.0999), usual, -usual)
+    text = misfit_of_depths(found, NO_ERRORS, 3.0)
+    assert ("the bit went" in text) == is_told
+    if is_told and step > 0.0:
+        upper, lower = found.bit[2:4]
+        assert f"from {upper:.2f} to {lower:.2f} m the bit went {lower - upper:.2f} m" in text
+        assert "tubes of 3.50 m were added" in text
+
+
+def test_a_step_of_five_centimetres_is_told_where_all_others_are_alike_and_none_of_less() -> None:
+    assert "the bit went" in misfit_of_depths(depths(0.0, 0.081, 0.0, 0.0, 0.0), NO_ERRORS, 3.0)
+    assert misfit_of_depths(depths(0.0, 0.079, 0.0, 0.0, 0.0), NO_ERRORS, 3.0) == ""
+    assert misfit_of_depths(depths(0.0, 0.3, 0.0, 0.0), NO_ERRORS, 3.0) == ""  # three others make no habit
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_depth_that_counts_too_much_shows_in_all_steps_together(sign: float) -> None:
+    """Five steps of 2 cm are a drift of 10 cm, of 14.3 m of tubes."""
+    found = depths(*[0.02 * sign] * 5, errors_at_zero=-1.0)
+    assert f"0.7 % {'more' if sign > 0.0 else 'less'} than the tubes" in misfit_of_depths(found, NO_ERRORS, 3.0)
+    once = 2.0 * 0.01**2
+    for tube_std in (0.0051, 0.0069):  # five tubes, of which the sum scatters by the root of five
+        told = 5.0 * math.sqrt(5.0 * tube_std**2 + once) < 0.1
+        errors = DepthErrors(0.0, 0.0, tube_std, 0.002)
+        assert bool(misfit_of_depths(found, errors, 3.0)) == told
+    gone = float(found.bit[-1] - found.bit[0])
+    for scale in (0.9, 1.1):
+        std = math.sqrt(0.02**2 - once) / gone
+        assert bool(misfit_of_depths(found, DepthErrors(scale * std, 0.0, 0.0, 0.002), 3.0)) == (scale < 1.0)
+
+
+def test_a_bit_deeper_than_its_tubes_is_told_beyond_five_deviations() -> None:
+    errors = DepthErrors(0.001, 0.01, 0.02, 0.005)
+    reach = np.array([5.0, 10.0])
+    for over, told in ((0.99, False), (1.01, True)):
+        std = math.sqrt((0.001 * 10.22) ** 2 + 4 * 0.02**2 + 0.01**2 + 0.005**2)
+        found = MakeUpDepths(np.array([2, 4]), np.array([3.0, 10.0 + over * 5.0 * std]), reach)
+        text = misfit_of_depths(found, errors, 3.0)
+        assert text.endswith("m with 4 tubes of 10.00 m: stick-up, depth or lengths are wrong") == told
+    assert misfit_of_depths(MakeUpDepths(np.array([1]), np.array([9.0]), np.array([2.0])), errors, 3.0) == ""
