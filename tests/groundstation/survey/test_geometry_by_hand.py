@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
+from groundstation.survey.fusion.resolve import Direction
+from groundstation.survey.path.curvature_prior import CurvaturePrior
+from groundstation.survey.path.curvature_tendency import learn_curvature
+from groundstation.survey.wall.column_deviation import ColumnDesign
 from groundstation.survey.wall.column_joint import (
     joint_thickness,
     limit_distances,
     probability_beyond,
     shift_margin,
 )
+from groundstation.survey.wall.projected_end import project_to_target
 from groundstation.survey.wall.voids import find_voids, power_centre, triples_of
 from groundstation.survey.well.depth_errors import DepthErrors
 from groundstation.survey.well.make_up_depths import (
@@ -21,6 +27,7 @@ from groundstation.survey.well.make_up_depths import (
     make_up_depths,
     misfit_of_depths,
 )
+from groundstation.survey.well.trajectory_rows import TrajectoryPoint
 
 Array = np.ndarray
 
@@ -147,6 +154,66 @@ def test_the_chance_beyond_a_distance_of_a_long_covariance_is_that_of_a_fine_sum
     expected = float(weight @ (np.hypot(x, y) > 0.45) @ weight)
     found = float(probability_beyond(np.array(mean), root @ root.T, np.array(0.45)))
     assert found == pytest.approx(expected, abs=2e-4)
+
+
+# ends
+
+TIPPED = math.radians(12.0)
+
+
+def foreseen(position: list[float], lean: float, own: float = 1e-3, shared: float = 0.0) -> Any:
+    """The end of a hole that goes straight on to a design that leans by twelve degrees to the north."""
+    tangent = np.array([math.sin(lean), 0.0, math.cos(lean)])
+    axis = np.array([math.sin(TIPPED), 0.0, math.cos(TIPPED)])
+    cov = own**2 * (np.eye(2) - np.outer(tangent[:2], tangent[:2]))
+    columns = np.array([[0.0], [shared]]) if shared else np.zeros((2, 0))
+    direction = Direction(tangent[:2], tangent[2], cov, columns)
+    tendency = learn_curvature(
+        2.0 * np.arange(6), np.tile(tangent, (6, 1)), np.zeros((6, 3, 3)),
+        CurvaturePrior(np.array([1e-9]), np.array([400.0]), np.ones((1, 1)), np.zeros(1), np.ones(1), 1e-9, 1e6),
+    )  # fmt: skip
+    point = TrajectoryPoint(11.0, tangent, np.array(position), np.diag([1.0, 4.0, 9.0]) * 1e-4, np.zeros((3, 0)))
+    return project_to_target(point, direction, tendency, ColumnDesign(inclination=TIPPED)), tangent, axis
+
+
+def test_the_end_is_where_the_line_meets_the_plane_across_the_design_with_an_error_along_it_turned_onto_it() -> None:
+    found, tangent, axis = foreseen([2.0, 0.3, 9.0], math.radians(8.0))
+    design = ColumnDesign(inclination=TIPPED)
+    rest = float((design.end.point - [2.0, 0.3, 9.0]) @ axis) / float(tangent @ axis)
+    meeting = np.array([2.0, 0.3, 9.0]) + rest * tangent
+    assert found.ends.offset == pytest.approx(design.end.across @ (meeting - design.end.point))
+    assert found.ends.along == pytest.approx(design.length)
+    assert found.ends.md == pytest.approx(11.0 + rest)
+    start = float((np.array([2.0, 0.3, 9.0]) - design.end.point) @ axis)
+    expected = [design.length + start * (1.0 - k / 8.0) for k in range(1, 9)]
+    assert [one.mean.along for one in found.cone] == pytest.approx(expected)
+    assert [one.mean.md for one in found.cone] == pytest.approx([11.0 + rest * k / 8.0 for k in range(1, 9)])
+    random = np.random.default_rng(2)
+    off = random.standard_normal((100_000, 3)) * [0.01, 0.02, 0.03]
+    # across the hole alone: what is along it moves the station down the same line
+    along = (off @ axis)[:, None] / float(tangent @ axis) * tangent
+    drawn = np.cov(((off - along) @ design.end.across.T).T)
+    assert found.ends.cov == pytest.approx(drawn, rel=0.02, abs=1e-6)
+    assert found.is_reached is False
+
+
+def test_what_directions_share_turns_the_whole_hole_and_what_is_their_own_does_not() -> None:
+    alone, _, _ = foreseen([2.0, 0.3, 9.0], math.radians(8.0), own=0.02)
+    bare, _, _ = foreseen([2.0, 0.3, 9.0], math.radians(8.0), own=1e-6)
+    shared, _, _ = foreseen([2.0, 0.3, 9.0], math.radians(8.0), own=1e-6, shared=0.02)
+    assert alone.ends.cov == pytest.approx(bare.ends.cov)
+    rest = float(shared.ends.md) - 11.0
+    together = math.sqrt(bare.measured[1, 1]) + 0.02 * rest  # and errs as the position does
+    assert math.sqrt(shared.measured[1, 1]) == pytest.approx(together, rel=1e-3)
+
+
+@pytest.mark.parametrize(("lean_deg", "comes"), [(12.0 + 87.0, True), (12.0 + 87.3, False), (12.0 + 120.0, False)])
+def test_a_hole_that_all_but_lies_across_its_design_does_not_come_there(lean_deg: float, comes: bool) -> None:
+    """By a cosine of a twentieth, which is 87.13 degrees."""
+    found, _, _ = foreseen([2.0, 0.3, 9.0], math.radians(lean_deg))
+    assert (found.comes_there, found.is_reached) == (comes, False)
+    below, _, _ = foreseen([20.0, 0.3, 90.0], math.radians(lean_deg))
+    assert (below.comes_there, below.is_reached) == (comes, comes)
 
 
 # make-ups
