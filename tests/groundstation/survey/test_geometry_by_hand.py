@@ -36,13 +36,13 @@ Array = np.ndarray
 
 
 def discs(seed: int) -> tuple[Array, Array]:
-    """A wall of columns of three sizes, one inside another, one twice, one that is not there, one that stands alone."""
+    """Columns of three sizes: one is inside another, one in a joint, one twice, one not there, one stands alone."""
     random = np.random.default_rng(seed)
     grid = np.stack(np.meshgrid(np.arange(6.0), np.arange(6.0)), axis=-1).reshape(-1, 2)
     centres, radii = grid + 0.03 * random.standard_normal(grid.shape), random.choice([0.52, 0.56, 0.62], len(grid))
     centres[9], radii[21] = math.nan, 0.17
-    centres = np.vstack([centres, centres[0], centres[3] + 0.05])
-    return centres, np.concatenate([radii, [radii[0], 0.3]])
+    centres = np.vstack([centres, centres[0], centres[3] + 0.05, (centres[14] + centres[15]) / 2.0])
+    return centres, np.concatenate([radii, [radii[0], 0.3, 0.1]])  # the last lies in the joint of two
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -101,8 +101,8 @@ def test_a_power_centre_is_as_far_from_three_discs_by_their_tangents() -> None:
 
 
 def test_triples_are_near_each_other_all_three() -> None:
-    heads = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1.0]])
-    assert triples_of(heads, 1.5).tolist() == [[0, 1, 3], [1, 2, 3]]
+    heads = np.array([[1.0, 0.0], [0.0, 0.0], [2.0, 0.0], [1.0, 1.0]])
+    assert triples_of(heads, 1.5).tolist() == [[0, 1, 3], [0, 2, 3]]
     assert triples_of(heads, 0.5).shape == (0, 3)
 
 
