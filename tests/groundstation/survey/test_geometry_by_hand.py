@@ -144,6 +144,12 @@ def test_the_chance_beyond_a_distance_is_that_of_the_noncentral_chi_square(std: 
         assert found == pytest.approx(expected, rel=1e-6, abs=1e-14)
 
 
+@pytest.mark.parametrize("std", [0.02, 0.04, 0.06, 0.1, 0.5])
+def test_a_small_chance_beyond_a_distance_is_as_exact_as_a_large_one(std: float) -> None:
+    found = float(probability_beyond(np.zeros(2), std**2 * np.eye(2), np.array(0.6)))
+    assert found == pytest.approx(math.exp(-0.5 * (0.6 / std) ** 2), rel=1e-6, abs=0.0)
+
+
 @pytest.mark.parametrize("mean", [(0.0, 0.0), (0.3, -0.2), (-0.2, 0.5)])
 def test_the_chance_beyond_a_distance_of_a_long_covariance_is_that_of_a_fine_sum(mean: tuple[float, float]) -> None:
     root = np.array([[0.25, 0.0], [0.1, 0.06]])
