@@ -144,10 +144,18 @@ def test_the_chance_beyond_a_distance_is_that_of_the_noncentral_chi_square(std: 
         assert found == pytest.approx(expected, rel=1e-6, abs=1e-14)
 
 
-@pytest.mark.parametrize("std", [0.02, 0.04, 0.06, 0.1, 0.5])
-def test_a_small_chance_beyond_a_distance_is_as_exact_as_a_large_one(std: float) -> None:
-    found = float(probability_beyond(np.zeros(2), std**2 * np.eye(2), np.array(0.6)))
-    assert found == pytest.approx(math.exp(-0.5 * (0.6 / std) ** 2), rel=1e-6, abs=0.0)
+@pytest.mark.parametrize("deviations", [1.0, 3.5, 5.0, 8.0, 20.0])
+def test_a_small_chance_beyond_a_distance_is_as_exact_as_a_large_one_on_both_sides(deviations: float) -> None:
+    from scipy.special import ndtr
+
+    long, thin = 0.6 / deviations, 0.01
+    steps = (np.arange(4000) + 0.5) / 4000 * 16.0 - 8.0
+    chords = np.sqrt(0.36 - (thin * steps) ** 2)
+    weight = np.exp(-0.5 * steps**2) / math.sqrt(math.tau) * (16.0 / 4000)
+    for off in (0.0, 0.3 * long):
+        expected = float(weight @ (ndtr((off - chords) / long) + ndtr((-off - chords) / long)))
+        found = float(probability_beyond(np.array([0.0, off]), np.diag([thin**2, long**2]), np.array(0.6)))
+        assert found == pytest.approx(expected, rel=1e-5, abs=0.0)
 
 
 @pytest.mark.parametrize("mean", [(0.0, 0.0), (0.3, -0.2), (-0.2, 0.5)])
