@@ -95,6 +95,15 @@ def test_a_column_that_stands_free_in_a_void_takes_its_area_from_it(turn: float)
     assert beside[0].area == pytest.approx(empty.area)
 
 
+@pytest.mark.parametrize("radius", [0.51, 0.55, 0.57, 0.577])
+def test_a_small_void_of_three_columns_is_the_triangle_less_sectors_and_lenses(radius: float) -> None:
+    centres = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, math.sqrt(0.75)]])
+    (void,) = find_voids(centres, np.full(3, radius))
+    lens = 2.0 * (radius**2 * math.acos(0.5 / radius) - 0.5 * math.sqrt(radius**2 - 0.25))
+    assert void.area == pytest.approx(math.sqrt(3.0) / 4.0 - math.pi / 2.0 * radius**2 + 1.5 * lens, abs=1e-12)
+    assert void.radius == pytest.approx(1.0 / math.sqrt(3.0) - radius)
+
+
 def test_a_power_centre_is_as_far_from_three_discs_by_their_tangents() -> None:
     centres, radii = np.array([[[0.0, 0.0], [3.0, 0.5], [1.0, 2.5]]]), np.array([[0.4, 0.9, 0.6]])
     (meeting,) = power_centre(centres, radii)
