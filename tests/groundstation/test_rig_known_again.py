@@ -15,7 +15,9 @@ from test_rig_seen_twice import joint
 from groundstation.config import GroundConfig
 from groundstation.errors import StoreError
 from groundstation.service.alarms.watch import LOOK_EVERY, PLACED_WITHIN, Watch
+from groundstation.service.hole import placement as placement_room
 from groundstation.service.hole.history import KEPT, History
+from groundstation.service.hole.placement import Placement
 from groundstation.service.orders.recalibration.control import Recalibration
 from groundstation.service.orders.recalibration.procedure import CLOCK_TOLERANCE as TOLERANCE
 from groundstation.service.orders.recalibration.procedure import FieldProcedure, Request
@@ -201,3 +203,32 @@ def test_a_node_may_be_above_the_collar_by_a_rounding_and_is_then_at_it(
     found = string.depth_of(message, 2.0)
     assert found == (None if depth is None else pytest.approx(depth))
     assert math.copysign(1.0, found if found is not None else 1.0) == 1.0
+
+
+def test_measurements_are_resolved_at_their_corrected_depths_and_none_above_the_collar(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    flags = {1: NodeFlag.NONE, 2: NodeFlag.CLOCK_UNSYNCHRONISED, 3: NodeFlag.NONE, 4: NodeFlag.NONE}
+    messages: list[Any] = [SimpleNamespace(tube=tube, hops=5 - tube, flags=one) for tube, one in flags.items()]
+    asked: list[Any] = []
+
+    def resolve(fused: list[Any], depths: list[float], above: list[Any], below: list[Any]) -> list[str]:
+        asked.append(([one.tube for one in fused], depths, above, below))
+        return [f"found {one.tube}" for one in fused]
+
+    monkeypatch.setattr(placement_room, "corrected_measurement", lambda m, _chain, _setup: m)
+    monkeypatch.setattr(placement_room, "depth_shift", lambda tube, _tubes, _length, _setup: -0.5 * tube)
+    tally = SimpleNamespace(above=lambda tube, hops: ("above", tube, hops), below=lambda tube: ("below", tube))
+    placement = Placement.__new__(Placement)
+    placement._setup = SimpleNamespace(doubled=SimpleNamespace(places={}), moves_depths=True)
+    placement._string, placement._tube_length = SimpleNamespace(tally=tally, tubes=[1, 2, 3, 4]), 3.0
+    placement._resolver = SimpleNamespace(resolve_measurements=resolve)
+    found = placement.resolve_measurements(messages, [9.0, 8.0, 1.2, 7.0])
+    assert found == ["found 1", None, "found 3", "found 4"]
+    above = [("above", 1, 4), ("above", 3, 2), ("above", 4, 1)]
+    assert asked == [([1, 3, 4], [8.5, 0.0, 5.0], above, [("below", 1), ("below", 3), ("below", 4)])]
+    placement._setup.moves_depths = False
+    assert placement.resolve_measurements(messages[1:2], [8.0]) == [None]
+    assert len(asked) == 1
+    placement.resolve_measurements(messages[2:], [1.2, 7.0])
+    assert asked[1][:2] == ([3, 4], [1.2, 7.0])

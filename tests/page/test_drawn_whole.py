@@ -292,3 +292,50 @@ def test_of_the_course_every_element_and_what_is_written_below_it(page: Page) ->
     assert page.evaluate(state) == ["1", "1", False, True, "live", "live", False]
     (path,) = [one for one in drawn(page, "course") if one[1] == "path"]
     assert path[2] == pytest.approx([34.0, 84.0 - 10.0 / 120.0 * 78.0])
+
+
+def test_a_column_of_a_moment_that_is_no_longer_asked_for_is_not_drawn(page: Page) -> None:
+    moments = [
+        {
+            "moment": 4 + k,
+            "md_m": 2.0,
+            "at_s": 60.0,
+            "stations": 3,
+            "off_cm": 12.0,
+            "limit_cm": 40.0,
+            "used_percent": 30.0,
+        }
+        for k in range(3)
+    ]
+    held: list[Any] = []
+
+    def hold(route: Any) -> None:
+        held.append(route)
+
+    page.route("**/api/column?moment=*", hold)
+    tell(page, "history", {"moments": moments})
+    tell(page, "verdict", verdict(1))
+    page.focus("#moment")
+    for count in (1, 2):
+        page.keyboard.press("ArrowLeft")
+        while len(held) < count:
+            page.wait_for_timeout(5)
+    assert [route.request.url.rpartition("=")[2] for route in held] == ["6", "5"]
+
+    def answer(route: Any, content: dict[str, Any]) -> str:
+        with page.expect_response("**/api/column?moment=*"):
+            route.fulfill(json=content)
+        page.wait_for_timeout(20)
+        return page.locator("#plan").inner_html()
+
+    newest = answer(held[1], column(row(0.0, 0.0, 0.0), row(2.0, 5.0, 1.0)))
+    late = answer(held[0], column(row(0.0, 0.0, 0.0), row(2.0, -9.0, 4.0)))
+    assert late == newest
+    page.keyboard.press("ArrowLeft")
+    while len(held) < 3:
+        page.wait_for_timeout(5)
+    assert answer(held[2], {"error": "gone"}) == newest
+    page.keyboard.press("ArrowRight")
+    while len(held) < 4:
+        page.wait_for_timeout(5)
+    assert answer(held[3], column(row(0.0, 0.0, 0.0), row(2.0, -9.0, 4.0))) != newest

@@ -101,6 +101,11 @@ def test_an_order_asks_for_a_role_once_and_is_sent_then(page: Page) -> None:
     asked(page, 1)
     expect(page.locator("#sign-in")).to_be_visible()
     expect(page.locator("#message")).to_have_text("")
+    expect(page.locator("#sign")).to_have_text("Sign in")
+    page.click("#sign-cancel")  # and one who cancels that is asked again before anything is sent
+    page.click("#depth")
+    expect(page.locator("#sign-in")).to_be_visible()
+    assert page.evaluate("window.asked") == []
     lay(page, (200, SIGNED | {"csrf": "c2"}), (202, {}))
     sign_in(page)
     assert asked(page, 2) == [session("POST", "c1", LOGIN), order("accept_depth", {"action": "confirm"}, "c2")]

@@ -78,8 +78,15 @@ def _defect_of(package: str, row: dict[str, object]) -> Defect:
 
 
 def sample_of(defects: Iterable[Defect], size: int) -> list[Defect]:
-    """Every so manieth defect, so that each package and kind has its share."""
+    """Every so manieth defect, so that each package and kind has its share; of a small package one all the same."""
     ordered = sorted(defects, key=lambda d: (d.package, d.kind, d.name))
     if size >= len(ordered):
         return ordered
-    return [ordered[k * len(ordered) // size] for k in range(size)]
+    found = [ordered[k * len(ordered) // size] for k in range(size)]
+    for defect in ordered:
+        counts = Counter(one.package for one in found)
+        if defect.package not in counts:
+            largest = max(sorted(counts), key=counts.__getitem__)
+            found.remove(next(one for one in found if one.package == largest))
+            found.append(defect)
+    return sorted(found, key=ordered.index)

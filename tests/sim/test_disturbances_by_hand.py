@@ -21,6 +21,8 @@ from sim.world.disturbance import accelerometer, converter, gyroscope, warm_up
 from sim.world.marks import Marks
 from sim.world.rack import Rack
 from sim.world.random_streams import RandomStream, random_stream
+from sim.world.rough_disc import RoughDisc
+from sim.world.rough_section import RoughEncoderSection
 from sim.world.scenario import scenario_of
 from sim.world.torsion import StringTorsion, torsional_stiffness
 from sim.world.world import World
@@ -218,3 +220,67 @@ def test_a_measured_depth_errs_anew_at_every_stop_and_goes_there_while_the_bit_i
     ]
     middle = 0.5 * (draws[0] + draws[1])
     assert off == pytest.approx([draws[0], draws[0], middle, *[draws[1]] * 3, draws[2], draws[3], draws[3]])
+
+
+# an encoder in the field
+
+
+def rough(head: np.ndarray, t: np.ndarray, *, lines: int = 36, **section: float | bool | int) -> RoughDisc:
+    random = np.random.default_rng(6)
+    errors = 0.1 * math.tau / lines * random.uniform(-1.0, 1.0, lines)
+    return RoughDisc(RoughEncoderSection(**section), t, head, 100.0, errors, 8)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("section", [{}, {"reversed": True}, {"eccentricity_deg": 3.0}, {"belt_slip": 0.05}])
+def test_edges_are_where_the_disc_passes_its_lines_and_the_twelve_latest_of_one_sense_are_told(
+    section: dict[str, Any],
+) -> None:
+    t = 100.0 + 0.5 * np.arange(81)
+    head = 0.3 + 2.0 * np.sin(0.15 * (t - 100.0)) + 0.2 * (t - 100.0)
+    disc = rough(head, t, **section)
+    fine = np.arange(100.0, 140.0, 0.001)
+    shown = np.interp(fine, t, disc.shown)
+    width = math.tau / 36
+    near = np.floor(shown / width).astype(int)
+    around = np.stack([near + k for k in (-1, 0, 1, 2)])
+    lines = around * width + disc._errors[around % 36]
+    count = np.where(lines <= shown, around, -(10**6)).max(axis=0)
+    at = np.flatnonzero(np.diff(count)) + 1
+    edges, rises, after = fine[at], np.diff(count)[at - 1] > 0, count[at]
+    assert len(edges) > 40
+    assert 0 < int(np.sum(rises)) < len(rises)
+    for k in range(3, len(edges) - 1, 4):
+        if edges[k + 1] - edges[k] < 0.004:
+            continue
+        found = disc.sample(float(edges[k]) + 0.002)
+        first = k
+        while first > max(k - 11, 0) and rises[first - 1] == rises[k]:
+            first -= 1
+        assert (found[0], found[2]) == (after[k], int(rises[k]))
+        assert found[1] == pytest.approx(edges[k], abs=0.0011)
+        assert list(found[3]) == pytest.approx(edges[first:k][::-1].tolist(), abs=0.0011)
+        assert disc.samples(np.array([edges[k] + 0.002]))[0] == pytest.approx([found[0], found[1], found[2]])
+    assert disc.sample(100.0) == (count[0], 100.0, 1, ())
+
+
+def test_a_disc_shows_what_its_seat_its_belt_and_its_wires_make_of_the_head() -> None:
+    t, head = np.arange(3.0), np.array([0.5, 4.0, 9.0])
+    bare = rough(head, t)
+    assert bare.shown == pytest.approx(head)
+    assert rough(head, t, reversed=True).shown == pytest.approx(1.0 - head)
+    assert rough(head, t, belt_slip=0.1).shown == pytest.approx(head - 0.1 * (head - 0.5))
+    once_a_turn = head - 0.1 * np.array([0.0, 3.5, 8.5 - math.tau])
+    assert rough(head, t, belt_slip=0.1, index=True).shown == pytest.approx(once_a_turn)
+    off_centre = rough(head, t, eccentricity_deg=2.0)
+    assert off_centre.shown - head == pytest.approx(math.radians(2.0) * np.sin(head + off_centre._phase))
+
+
+@pytest.mark.parametrize(("index", "after_a_turn"), [(False, 4), (True, 0)])
+def test_counts_that_jump_stay_wrong_until_an_index_passes_in_either_sense(index: bool, after_a_turn: int) -> None:
+    t = np.array([100.0, 110.0, 120.0])
+    for sign in (1.0, -1.0):
+        disc = rough(sign * np.array([1.0, 2.0, 9.0]), t, jump_deg=40.0, jump_s=3.0, index=index)
+        off = [disc.sample(at)[0] - int(disc.samples(np.array([at]))[0, 0]) for at in (102.999, 103.0, 109.0, 119.9)]
+        assert off == [0, 4, 4, after_a_turn]
+    stuck = rough(np.array([1.0, 2.0, 9.0]), t, stuck_bit=3)
+    assert stuck.sample(105.0)[0] == int(stuck.samples(np.array([105.0]))[0, 0]) | 8

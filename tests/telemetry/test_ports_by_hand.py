@@ -191,7 +191,7 @@ class SilentController:
         time.sleep(0.005)
 
     def send(self, identifier: int, data: bytes) -> None:
-        """Nobody acknowledges it."""
+        """It is never acknowledged."""
 
     def shutdown(self) -> None:
         """Nothing to close."""

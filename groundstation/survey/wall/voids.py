@@ -1,7 +1,8 @@
 """Voids of a grid: parts of the plane that no column covers though columns stand all around them.
 
 The boundary of a union of discs consists of arcs. Followed with the disc on the left, an outer boundary turns
-counter-clockwise and the boundary of a void clockwise, so a loop whose area is negative is a void and that is its size.
+counter-clockwise and the boundary of a void clockwise, so a loop whose area is negative is a void and that is its size,
+less the columns that stand free inside it.
 The deepest point of a void is where the power lines of three discs meet. Frame: the plane across the columns; m.
 """
 
@@ -43,13 +44,20 @@ def find_voids(centres: Array, radii: Array) -> list[Void]:
     """Voids between discs (n, 2) of radii (n,); discs without a centre (nan) are not there."""
     present = np.flatnonzero(np.isfinite(centres[:, 0]) & (radii > 0.0))
     arcs = [arc for disc in present.tolist() for arc in _exposed(disc, present, centres, radii)]
+    loops = _loops(arcs, centres, radii)
+    areas = [sum(_area(arc, centres, radii) for arc in loop) for loop in loops]
+    holes = [(-area, loop) for area, loop in zip(areas, loops, strict=True) if area < -SMALLEST_AREA]
+    taken = [0.0] * len(holes)
+    for area, loop in zip(areas, loops, strict=True):
+        point = _point(loop[0].disc, loop[0].begin, centres, radii)
+        inside = [k for k, (_, hole) in enumerate(holes) if area > 0.0 and _is_around(hole, point, centres, radii)]
+        if inside:  # of holes inside each other's islands the innermost
+            taken[min(inside, key=lambda k: holes[k][0])] += area
     found = []
-    for loop in _loops(arcs, centres, radii):
-        area = sum(_area(arc, centres, radii) for arc in loop)
-        if area < -SMALLEST_AREA:
-            around = tuple(sorted({arc.disc for arc in loop}))
-            place, free = _deepest(around, loop, present, centres, radii)
-            found.append(Void(around, -area, place, free))
+    for (area, loop), islands in zip(holes, taken, strict=True):
+        around = tuple(sorted({arc.disc for arc in loop}))
+        place, free = _deepest(around, loop, present, centres, radii)
+        found.append(Void(around, area - islands, place, free))
     return found
 
 
@@ -116,6 +124,17 @@ def _next(arc: Arc, candidates: list[Arc], centres: Array, radii: Array) -> Arc 
 def _point(disc: int, angle: float, centres: Array, radii: Array) -> tuple[float, float]:
     x, y = centres[disc]
     return float(x + radii[disc] * math.cos(angle)), float(y + radii[disc] * math.sin(angle))
+
+
+def _is_around(loop: list[Arc], point: tuple[float, float], centres: Array, radii: Array) -> bool:
+    """Whether a loop goes around a point outside its discs: seen from there no arc turns by more than half a turn."""
+    turned = 0.0
+    for arc in loop:
+        x, y = centres[arc.disc] - point
+        for angle, sign in ((arc.end, 1.0), (arc.begin, -1.0)):
+            dx, dy = x + radii[arc.disc] * math.cos(angle), y + radii[arc.disc] * math.sin(angle)
+            turned += sign * math.atan2(x * dy - y * dx, x * dx + y * dy)
+    return abs(turned) > math.pi
 
 
 def _area(arc: Arc, centres: Array, radii: Array) -> float:

@@ -11,6 +11,14 @@ import pytest
 
 from groundstation.calibration.accuracy import Accuracy, combined_accuracy, relative_error, sensor_characteristic
 from groundstation.calibration.attitudes import AttitudeFit
+from groundstation.calibration.bias_model import (
+    FilterNoise,
+    drift_std,
+    filter_noise,
+    fit_bias_model,
+    gauss_markov_variance,
+    seen_drift,
+)
 from groundstation.calibration.gravity_sphere import PARAMETERS, fit_gravity_sphere
 from groundstation.calibration.intervals import Interval
 from groundstation.calibration.jig import Jig, combined_uncertainty, settings_of
@@ -349,3 +357,64 @@ def test_a_lean_of_the_jig_is_one_error_at_each_tilt_and_another_at_each_tool_fa
         cov, noise = with_jig(problem, np.zeros(3), weights, jig)
         assert cov == pytest.approx(weights @ normal @ weights)
         assert noise == 0.0
+
+
+# what a filter takes of a sensor's noise
+
+
+def variances_of(t: np.ndarray, white: float, bias: float, tau: float) -> np.ndarray:
+    return np.asarray(white**2 / t + bias**2 * gauss_markov_variance(t, tau))
+
+
+def test_an_allan_variance_of_a_bias_is_that_of_its_covariances() -> None:
+    """Half the mean square of the difference of two neighbouring means of a process of exp(-|t| / 7)."""
+    for tau in (0.5, 6.0, 90.0):
+        t = tau * (np.arange(1000) + 0.5) / 1000
+        same = float(np.mean(np.exp(-np.abs(t[:, None] - t) / 7.0)))
+        next_to = float(np.mean(np.exp(-np.abs(t[:, None] - t - tau) / 7.0)))
+        assert float(gauss_markov_variance(tau, 7.0)) == pytest.approx(same - next_to, rel=1e-3)
+
+
+def test_a_curve_through_two_points_passes_through_them() -> None:
+    found = filter_noise(0.02, 0.008, 40.0)
+    assert found.bias_tau == pytest.approx(40.0 / 1.89)
+    through = variances_of(np.array([1.0, 40.0]), found.white, found.bias_std, found.bias_tau)
+    assert np.sqrt(through) == pytest.approx([0.02, 0.008])
+    for one, floor, at in ((0.02, 0.5, 40.0), (0.02, 0.0001, 40.0), (0.02, 0.008, 1.0)):
+        with pytest.raises(CalibrationError, match="filter noise"):
+            filter_noise(one, floor, at)
+
+
+@pytest.mark.parametrize(("learnt", "span", "tau"), [(60.0, 300.0, 40.0), (20.0, 5.0, 200.0)])
+def test_a_drift_is_that_of_the_covariances_of_its_bias(learnt: float, span: float, tau: float) -> None:
+    count = 1500
+    t = np.concatenate([learnt * (np.arange(count) + 0.5) / count, learnt + span * (np.arange(count) + 0.5) / count])
+    weights = np.concatenate([np.full(count, -span / count), np.full(count, span / count)])
+    bias = float(weights @ np.exp(-np.abs(t[:, None] - t) / tau) @ weights)
+    white = 0.01**2 * (span + span**2 / learnt)
+    found = drift_std(FilterNoise(0.01, 0.02, tau), span, learnt)
+    assert found == pytest.approx(math.sqrt(white + 0.02**2 * bias), rel=1e-3)
+    rate = 4.0
+    ramp = 0.003 * np.arange(round(rate * 5.0 * (learnt + span))) / rate
+    assert seen_drift(ramp, rate, span, learnt) == pytest.approx(0.003 * span * (span + learnt) / 2.0, rel=1e-3)
+    assert seen_drift(ramp[: round(rate * 2.9 * (learnt + span))], rate, span, learnt) is None
+
+
+def test_a_bias_that_a_curve_shows_is_fitted_and_one_that_it_hides_has_a_bound() -> None:
+    t = np.geomspace(0.25, 600.0, 34)
+    confidence = 0.01 * np.sqrt(t / t[0])
+    found = fit_bias_model(t, np.sqrt(variances_of(t, 0.02, 0.01, 25.0)), confidence)
+    assert not found.is_bound
+    assert (found.white, found.bias_std, found.bias_tau) == pytest.approx((0.02, 0.01, 25.0), rel=0.3)
+    used = 1.0 + 1.0 / (2.0 * confidence**2) >= 6.0
+    longest = t[used][-1] / 1.89
+    white = variances_of(t, 0.02, 0.0, 1.0)[used]
+    error = np.hypot(2.0 * confidence[used], 0.1) * white
+    design = np.stack([1.0 / t[used], gauss_markov_variance(t[used], longest)], axis=1) / error[:, None]
+    std = math.sqrt(np.linalg.inv(design.T @ design)[1, 1])
+    hidden = fit_bias_model(t, np.sqrt(variances_of(t, 0.02, 0.0, 1.0)), confidence)
+    assert (hidden.is_bound, hidden.bias_tau, hidden.white) == (True, pytest.approx(longest), pytest.approx(0.02))
+    assert hidden.bias_std == pytest.approx(math.sqrt(1.645 * std))
+    for times, is_bound in ((1.0, True), (6.0, False)):
+        curve = np.sqrt(variances_of(t, 0.02, math.sqrt(times * std), longest))
+        assert fit_bias_model(t, curve, confidence).is_bound == is_bound
