@@ -36,7 +36,7 @@ def started(unit: Path) -> list[str]:
     return shlex.split(parser["Service"]["ExecStart"].replace("%i", "7"))
 
 
-@pytest.mark.parametrize("unit", [unit for unit in UNITS if "can@" not in unit.name], ids=lambda unit: unit.stem)
+@pytest.mark.parametrize("unit", [unit for unit in UNITS if "-can" not in unit.name], ids=lambda unit: unit.stem)
 def test_a_unit_starts_a_command_with_options_that_it_has(unit: Path, tmp_path: Path) -> None:
     program, name, *words = started(unit)
     assert program == PROGRAM
@@ -52,10 +52,10 @@ def test_a_unit_starts_a_command_with_options_that_it_has(unit: Path, tmp_path: 
 
 
 def test_every_unit_is_named_on_the_page_and_runs_as_no_root() -> None:
-    assert len(UNITS) == 5
+    assert len(UNITS) == 6
     for unit in UNITS:
         assert unit.stem.rstrip("@") in PAGE
-        if "can@" not in unit.name:
+        if "-can" not in unit.name:
             assert "\nUser=borechain\n" in unit.read_text()
 
 
@@ -69,6 +69,24 @@ def test_systemd_finds_no_fault_in_a_unit(unit: Path, tmp_path: Path) -> None:
     )
     faults = [line for line in done.stderr.splitlines() if unit.name.partition("@")[0] in line]
     assert faults == []
+
+
+def test_what_the_kernel_drives_is_given_to_the_user_of_the_units() -> None:
+    rules = [
+        line for line in (ROOT / "deploy" / "udev" / "60-borechain.rules").read_text().splitlines() if line[0] != "#"
+    ]
+    assert [re.match(r'SUBSYSTEM=="(\w+)"', rule)[1] for rule in rules] == ["iio", "counter", "gpio", "tty"]  # type: ignore[index]
+    for rule in rules:
+        parts = re.findall(r'([A-Z]+(?:\{[A-Z_]+\})?)(==|\+=|=)"([^"]+)"(?:, |$)', rule)
+        assert ", ".join(f'{name}{sign}"{value}"' for name, sign, value in parts) == rule
+        assert ("GROUP", "=", "borechain") in parts
+
+
+@pytest.mark.skipif(shutil.which("udevadm") is None, reason="no udevadm here")
+def test_udev_finds_no_fault_in_the_rules() -> None:
+    rules = ROOT / "deploy" / "udev" / "60-borechain.rules"
+    done = subprocess.run(["udevadm", "verify", str(rules)], capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0 or "Unknown command verb" in done.stderr + done.stdout, done.stderr
 
 
 def test_what_a_deployed_process_is_given_is_made_by_the_keys_command(tmp_path: Path) -> None:

@@ -46,3 +46,12 @@ def test_both_sensors_come_out_as_the_page_says_and_a_node_takes_them(tmp_path: 
     for sensor in ("gyroscope", "accelerometer"):
         (taken,) = own_corrections(sensor, (tmp_path / f"{sensor}.json",), 1)
         assert taken.matrix[0][0] == pytest.approx(1.0, abs=0.02)
+
+
+def test_what_is_said_to_show_a_promise_is_there() -> None:
+    table = (ROOT / "docs" / "calibration.md").read_text().partition("## What shows it")[2]
+    named = re.findall(r"`(?:tests/[a-z/]+/)?(test_[a-z_0-9]+\.py)`", table)
+    assert len(named) > 15
+    assert [name for name in named if not list((ROOT / "tests").rglob(name))] == []
+    places = re.findall(r"`((?:tests|docs)/[a-z_/0-9]+\.py)`|`python (docs/[a-z_]+\.py)`", table)
+    assert [place for pair in places for place in pair if place and not (ROOT / place).is_file()] == []

@@ -89,7 +89,16 @@ def linear_gates(
         largest = LARGEST_SHARE * float(np.abs(truth).max()) * nominal
     largest = math.hypot(largest, jig * nominal * float(np.linalg.norm(truth, axis=1).max()))
     worst = int(np.argmax(np.linalg.norm(fit.residuals, axis=1)))
-    judged = [] if jig > 0.0 else [_order(truth, fit), _shape(truth, fit), _halves(truth, readings, noise)]
+    judged = (
+        []
+        if jig > 0.0
+        else [
+            _order(truth, fit),
+            _shape(truth, fit),
+            _halves(truth, readings, noise),
+            _alone(truth, names, fit),
+        ]
+    )
     return [
         *axes_gates(fit.matrix / nominal),
         Gate(
@@ -213,6 +222,23 @@ def _shape(truth: Array, fit: AttitudeFit) -> Gate:
             share = abs(slope) * float(np.abs(felt).max()) ** 2
             return Gate("linear", False, f"axis {'xyz'[axis]} is bent by {share:.2%} of its largest reading")
     return Gate("linear", holds=True)
+
+
+def _alone(truth: Array, names: Sequence[str], fit: AttitudeFit) -> Gate:
+    """Whether no reading lies farther off than the noise of all others allows it to."""
+    n = len(truth)
+    if n - 5 < FEWEST_FREE:
+        return Gate("attitude", holds=True)
+    basis = np.column_stack([np.ones(n), truth])
+    free = 1.0 - np.sum(basis * np.linalg.pinv(basis).T, axis=1, keepdims=True)  # of each reading's variance
+    free = np.where(free > 1e-9, free, np.inf)  # a reading that the fit follows wherever it lies shows nothing
+    squares = np.sum(fit.residuals**2, axis=0)
+    others = np.maximum(squares - fit.residuals**2 / free, 1e-12 * squares + 1e-300) / (n - 5)
+    off = np.abs(fit.residuals) / np.sqrt(others * free)
+    worst = int(np.argmax(off.max(axis=1)))
+    limit = coverage_factor(n - 5, 1.0 - CHANCE / (3 * n))
+    text = f"{names[worst]} lies {off.max():.3g} times as far off as the others scatter: was it this attitude?"
+    return Gate("attitude", bool(off.max() <= limit), text)
 
 
 def _halves(truth: Array, readings: Array, noise: float) -> Gate:

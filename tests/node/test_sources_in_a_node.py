@@ -173,6 +173,28 @@ def test_the_yaw_is_that_of_the_same_samples_replayed_and_a_pulled_cable_is_told
     assert math.radians(node.yaw_deg) == pytest.approx(2.0, abs=1e-3)
 
 
+def test_a_device_that_vanishes_in_mid_cycle_gives_no_mean_of_a_half(live: Live, tmp_path: Path) -> None:
+    """Half of the cycle at 40 deg/s has come when the cable is pulled out: the cycle is lost, and is no rest either."""
+    node, (times, rates, forces) = Run(tmp_path / "live", live.source), samples()
+    for k in range(3):
+        live.send(times[:52] + k * PERIOD, rates[:52], forces[:52])
+        node.cycle(aided=True)
+    turning = rates[:26] + np.array([0.0, 0.0, math.radians(40.0)])
+    live.send(times[:26] + 3 * PERIOD, turning, forces[:26])
+    live.unplug()
+    node.cycle(aided=False)
+    ((code, detail),) = node.process.told
+    assert code == "sensor_failed"
+    assert "gone" in detail or "expected about 53" in detail
+    assert math.isnan(node.process.tube.raw.rate[2])
+    live.plug()
+    node.cycle(aided=False)
+    for k in range(4):
+        live.send(times[:52] + (5 + k) * PERIOD, rates[:52], forces[:52])
+        node.cycle(aided=True)
+    assert [code for code, _ in node.process.told] == ["sensor_failed", "sensor_back"]
+
+
 def test_a_node_over_another_family_ends_with_its_name(tmp_path: Path) -> None:
     device = EmulatedDevice(tmp_path, name="bmp280")
     with pytest.raises(SensorError, match=r"expected a device icm42688, got bmp280 \(iio:device0\)"):

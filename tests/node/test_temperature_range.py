@@ -13,6 +13,7 @@ from node.firmware.imu_settings import ANYWHERE, ImuSettings
 from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import PERIOD
 from node.process.cluster_options import ClusterRequest
+from node.process.temperature_range import unmeasured_bias
 from node.process.tube_process import TubeProcess
 from telemetry.application.clock import ClockFilter
 from telemetry.calibration import Calibration, Provenance, from_json, read_calibration, to_json, write_calibration
@@ -113,6 +114,14 @@ def test_each_way_out_is_told_once_and_the_bias_is_calm_within(tmp_path: Path) -
     assert (first["low_c"], first["high_c"], second["low_c"]) == (0.0, 40.0, 0.0)
     assert first["temperature_c"] > 40.0 > 0.0 > second["temperature_c"]
     assert last == {}  # within again
+
+
+@pytest.mark.parametrize(("off", "added"), [(10.0, 10.0 * 0.02 + 500.0 * 1e-3), (-30.0, -30.0 * 0.02 + 2100.0 * 1e-3)])
+def test_what_a_polynomial_adds_is_counted_from_the_nearer_end_of_its_range(off: float, added: float) -> None:
+    """By hand, of 0.02 d + 0.001 d^2 about 20 C: 30^2 - 20^2 from 40 to 50 C, 50^2 - 20^2 from 0 to -30 C."""
+    sensor = SensorParameters(bias_slopes=((0.02, 0.0, 0.0), (1e-3, 0.0, 0.0), (0.0,) * 3), reference=REFERENCE)
+    found = unmeasured_bias(ImuSettings(gyroscope=sensor, corrected_within=OVEN), off)
+    assert found.tolist() == pytest.approx([added, 0.0, 0.0])
 
 
 def test_a_calibration_keeps_its_range_and_one_of_before_keeps_its_hash(tmp_path: Path) -> None:

@@ -98,6 +98,18 @@ def test_silence_another_family_and_a_sensor_at_its_range_are_named(line: Line) 
     assert isinstance(imu_source(f"vn100:{line.path}"), Vn100)
 
 
+def test_a_cycle_of_which_half_is_missing_is_lost(line: Line) -> None:
+    source = started(line)
+    good = line_of(np.zeros(3), np.array([0.0, 0.0, 9.8]))
+    line.send(good * 50)
+    source.read(0.0, 0.5)
+    line.send(good * 26)
+    assert math.isfinite(source.read(0.5, 1.0).rate[2])
+    line.send(good * 24)
+    with pytest.raises(SensorError, match="expected about 50 lines, got 24"):
+        source.read(1.0, 1.5)
+
+
 def test_a_line_that_is_pulled_out_is_told_once_and_comes_back(line: Line, tmp_path: Path) -> None:
     port = tmp_path / "ttyUSB0"
     port.symlink_to(line.path)

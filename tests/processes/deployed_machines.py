@@ -28,7 +28,14 @@ from emulated_vn100 import Line, line_of
 from forked_commands import Command as Forked
 from rigs import started
 
-ROOMS = ("/etc/systemd/system", "/etc/borechain", "/opt/borechain", "/usr/local/bin", "/var/lib/borechain")
+ROOMS = (
+    "/etc/udev/rules.d",
+    "/etc/systemd/system",
+    "/etc/borechain",
+    "/opt/borechain",
+    "/usr/local/bin",
+    "/var/lib/borechain",
+)
 STAND_INS = {
     "sudo": 'while [ "${1#-}" != "$1" ]; do shift 2; done; exec "$@"',  # -u NAME, -g NAME
     "useradd": 'while [ "$1" != --home-dir ]; do shift; done; mkdir -p "$2"',
@@ -40,6 +47,7 @@ STAND_INS = {
     "pip": 'case "$2" in borechain\\[board\\]|borechain\\[ground\\]) ;; *) exit 1 ;; esac',
     "borechain": f'exec {shlex.quote(sys.executable)} -m borechain "$@"',
     "systemctl": 'shift 2; for unit; do echo "$unit" >> "$UNITS"; done',
+    "udevadm": 'ls "${UNITS%/units}"/etc/udev/rules.d/*.rules > /dev/null',
     "journalctl": '[ "$1" = -u ] && grep -qx "$2" "$UNITS"',
 }
 CAN_LINK = {
@@ -70,7 +78,7 @@ class Machine:
     running: dict[str, Forked] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for room in ("/etc/systemd/system", "/opt", "/usr/local/bin", "/var/lib"):
+        for room in ("/etc/udev/rules.d", "/etc/systemd/system", "/opt", "/usr/local/bin", "/var/lib"):
             (self.root / room[1:]).mkdir(parents=True)
 
     def place(self, text: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -102,6 +103,13 @@ def one_moved(angles: np.ndarray, readings: np.ndarray) -> tuple[np.ndarray, np.
     return angles, readings
 
 
+def one_nudged(angles: np.ndarray, readings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """By 0.07 deg: far below what residuals may be, and a dozen times the noise."""
+    readings = readings.copy()
+    readings[12] += [0.0, -0.012, 0.0]
+    return angles, readings
+
+
 @pytest.mark.parametrize(
     ("wrong", "gate"),
     [
@@ -117,6 +125,7 @@ def one_moved(angles: np.ndarray, readings: np.ndarray) -> tuple[np.ndarray, np.
         (pasted, "duplicates: 32 readings stand twice, as 1 and 17"),
         (one_weak, "axes: the axes are not three alike"),
         (one_moved, "residual: .* the largest is at 8"),
+        (one_nudged, r"attitude: 13 lies \d+(\.\d)? times as far off as the others scatter"),
     ],
 )
 def test_a_wrong_record_of_an_arm_is_refused_by_name_and_forced_with_its_finding(
@@ -189,6 +198,11 @@ def test_an_mwd_tool_whose_faces_run_backwards_or_whose_wires_are_exchanged_is_r
     wires = rewritten(lambda row: [*row[:3], row[4], row[3], *row[5:]])
     with pytest.raises(CalibrationError, match="tool face: turns against the jig's"):
         answer_calibration(wires, "2026-01-31")
+    rewritten(lambda row: [*row[:3], row[4], row[3], *row[5:]])
+    forced = answer_calibration(replace(wires, force=True), "2026-01-31")
+    assert any(found.startswith("tool face: turns against") for found in forced.result["forced"])
+    assert "forced past tool face: " in forced.result["design"]
+    assert any(fact == "Forced past" and text.startswith("tool face") for fact, text in forced.sheet.facts)
     twice = rewritten(lambda row: row)
     path.write_text(path.read_text() + "\n".join(lines[head + 1 :]) + "\n")
     with pytest.raises(CalibrationError, match="duplicates: 84 readings stand twice"):

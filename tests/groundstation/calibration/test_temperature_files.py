@@ -43,6 +43,7 @@ def test_a_node_applies_what_the_oven_showed(tmp_path: Path) -> None:
     block = from_json(calibrated(tmp_path, record(noise=0.0)).document)
     assert block.sensor == "gyroscope"
     assert block.reference == 30.0
+    assert block.valid == (-10.0, 70.0)
     assert np.degrees(block.bias) == pytest.approx(BIAS[0], abs=1e-8)
     assert np.degrees(block.bias_slopes) == pytest.approx(BIAS[1:], abs=1e-9)
     assert block.matrix == pytest.approx(MATRIX, abs=1e-9)
