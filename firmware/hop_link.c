@@ -33,7 +33,7 @@ void link_begin(struct hop_link *link, uint8_t address, uint32_t boot_count)
 
 bool link_is_up(const struct hop_link *link, uint32_t now_ms)
 {
-    return link->was_heard && now_ms - link->last_heard_ms <= LINK_SILENCE_MS;
+    return link->was_heard && !has_come(link->last_heard_ms + LINK_SILENCE_MS + 1u, now_ms);
 }
 
 void link_hear_signals(struct hop_link *link, uint32_t now_ms)
@@ -245,4 +245,9 @@ uint32_t link_best_effort(struct hop_link *link, const uint8_t *payload, uint32_
 uint32_t link_acknowledgement(struct hop_link *link, uint32_t now_ms, uint8_t *room, uint32_t size)
 {
     return link->is_ack_due && has_come(link->ack_due_ms, now_ms) ? build(link, NULL, room, size) : 0u;
+}
+
+uint32_t link_tell(struct hop_link *link, uint8_t *room, uint32_t size)
+{
+    return build(link, NULL, room, size);
 }

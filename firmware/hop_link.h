@@ -106,5 +106,7 @@ enum link_answer link_receive(
 uint32_t link_next_numbered(struct hop_link *link, uint32_t now_ms, uint8_t *room, uint32_t size);
 uint32_t link_best_effort(struct hop_link *link, const uint8_t *payload, uint32_t length, uint8_t *room, uint32_t size);
 uint32_t link_acknowledgement(struct hop_link *link, uint32_t now_ms, uint8_t *room, uint32_t size);
+/* The header alone: signals have none, and the other end numbers nothing for one that it does not know. */
+uint32_t link_tell(struct hop_link *link, uint8_t *room, uint32_t size);
 
 #endif
