@@ -132,7 +132,7 @@ wheel: $(STAMP)  ## a wheel in dist with kernels compiled for every processor of
 test-socketcan: $(STAMP)  ## joints on the kernel's own CAN, in a User-Mode Linux; says why where there is none
 	$(BIN)/python tests/tools/socketcan.py
 
-test-firmware: $(STAMP)  ## the step in C on this machine and on emulated chips; installs Debian's compilers and emulators, or says why not
+test-firmware: $(STAMP)  ## a node's C on this machine and on emulated chips; installs Debian's compilers and emulators, or says why not
 	$(PYTHON) tests/tools/install_compilers.py
 	$(PYTEST) --timeout 1800 tests/node/chip tests/firmware tests/test_firmware_command.py
 

@@ -12,6 +12,14 @@
 #define SHORT_LIMIT 4095u /* longest payload whose length fits the short first frame */
 #define PADDING 0xCCu
 
+/* Whether a transfer has stood still for too long. A time a little before it moved last is none: a caller may have taken
+ * it before the frame came. */
+static bool is_late(uint32_t moved_at_ms, uint32_t now_ms)
+{
+    const uint32_t since = now_ms - moved_at_ms;
+    return since > ISOTP_LIMIT_MS && since < UINT32_C(0x80000000);
+}
+
 uint8_t isotp_fd_length(uint8_t length)
 {
     static const uint8_t lengths[] = {8u, 12u, 16u, 20u, 24u, 32u, 48u, 64u};
@@ -131,7 +139,7 @@ enum isotp_answer isotp_on_flow(struct isotp_sender *sender, const uint8_t *data
 
 enum isotp_answer isotp_advance_sender(struct isotp_sender *sender, uint32_t now_ms)
 {
-    if (!isotp_awaits_flow(sender) || now_ms - sender->moved_at_ms <= ISOTP_LIMIT_MS) {
+    if (!isotp_awaits_flow(sender) || !is_late(sender->moved_at_ms, now_ms)) {
         return ISOTP_NOTHING;
     }
     sender->is_open = false;
@@ -262,7 +270,7 @@ enum isotp_answer isotp_on_frame(
 
 enum isotp_answer isotp_advance_receiver(struct isotp_receiver *receiver, uint32_t now_ms)
 {
-    if (!receiver->is_open || now_ms - receiver->moved_at_ms <= ISOTP_LIMIT_MS) {
+    if (!receiver->is_open || !is_late(receiver->moved_at_ms, now_ms)) {
         return ISOTP_NOTHING;
     }
     receiver->is_open = false;

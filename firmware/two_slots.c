@@ -1,27 +1,13 @@
 /* Two slots of flash, see two_slots.h. */
 #include "two_slots.h"
 
+#include "crc32.h"
+
 #include <string.h>
 
 #define MAGIC UINT32_C(0x32534342) /* "BCS2" */
 #define SUMMED 12u                 /* bytes of the header under the CRC */
 #define CHUNK 64u
-
-/* CRC-32 of IEEE 802.3, goes on from another one; begins with 0. */
-uint32_t slots_crc(uint32_t crc, const uint8_t *data, uint32_t length)
-{
-    static const uint32_t half_bytes[16] = {
-        0x00000000u, 0x1DB71064u, 0x3B6E20C8u, 0x26D930ACu, 0x76DC4190u, 0x6B6B51F4u, 0x4DB26158u, 0x5005713Cu,
-        0xEDB88320u, 0xF00F9344u, 0xD6D6A3E8u, 0xCB61B38Cu, 0x9B64C2B0u, 0x86D3D2D4u, 0xA00AE278u, 0xBDBDF21Cu};
-    crc = ~crc;
-    while (length > 0u) {
-        crc = half_bytes[(crc ^ *data) & 15u] ^ crc >> 4;
-        crc = half_bytes[(crc ^ (uint32_t)*data >> 4) & 15u] ^ crc >> 4;
-        data++;
-        length--;
-    }
-    return ~crc;
-}
 
 static void put_u32(uint8_t *data, uint32_t value)
 {
@@ -50,11 +36,11 @@ static bool is_whole(const struct slot_board *board, uint32_t slot, struct slot_
     if (get_u32(header) != MAGIC || found->length > board->size - SLOT_HEADER) {
         return false;
     }
-    crc = slots_crc(0u, header, SUMMED);
+    crc = crc32_of(0u, header, SUMMED);
     while (at < found->length) {
         const uint32_t part = found->length - at < CHUNK ? found->length - at : CHUNK;
         board->read(board->own, slot, SLOT_HEADER + at, chunk, part);
-        crc = slots_crc(crc, chunk, part);
+        crc = crc32_of(crc, chunk, part);
         at += part;
     }
     return crc == get_u32(&header[SUMMED]);
@@ -116,7 +102,7 @@ enum slot_answer slots_save(
     put_u32(&header[0], MAGIC);
     put_u32(&header[4], generation);
     put_u32(&header[8], length);
-    put_u32(&header[SUMMED], slots_crc(slots_crc(0u, header, SUMMED), content, length));
+    put_u32(&header[SUMMED], crc32_of(crc32_of(0u, header, SUMMED), content, length));
     if (!board->erase(board->own, slot) || !write_words(board, slot, SLOT_HEADER, content, length) ||
         !write_words(board, slot, 0u, header, SLOT_HEADER)) {
         return SLOT_WORN;

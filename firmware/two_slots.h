@@ -47,6 +47,4 @@ enum slot_answer slots_save(
     const uint8_t *content,
     uint32_t length);
 
-uint32_t slots_crc(uint32_t crc, const uint8_t *data, uint32_t length);
-
 #endif

@@ -230,6 +230,17 @@ def test_a_payload_that_was_given_up_is_asked_for_no_longer(isotp: ctypes.CDLL) 
 
 
 @needs_gcc
+@pytest.mark.parametrize("now", [5, 2**32 - 5])
+def test_a_time_from_before_the_frame_ends_nothing(isotp: ctypes.CDLL, now: int) -> None:
+    inward, outward = Inward(isotp, 100), Outward(isotp, bytes(50), 8, now)
+    inward.on_frame(outward.next_frame(now), now)
+    before = now - 7 & 0xFFFFFFFF
+    assert inward.advance(before) is outward.advance(before) is None
+    assert inward.is_open
+    assert outward.is_open
+
+
+@needs_gcc
 def test_room_for_less_than_a_single_frame_is_refused(isotp: ctypes.CDLL) -> None:
     room = (ctypes.c_uint8 * 62)()
     assert not isotp.isotp_listen(ctypes.byref(CReceiver()), room, 61)

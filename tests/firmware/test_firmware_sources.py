@@ -13,7 +13,7 @@ FIRMWARE = Path(__file__).parents[2] / "firmware"
 SOURCES = sorted(path.name for path in FIRMWARE.glob("*.c"))
 CHIP = ("-mcpu=cortex-m4", "-mthumb", "-Os", "-ffreestanding")
 OF_THE_COMPILER = {"memcpy", "memset", "memcmp"}  # gcc asks for them of any program
-MOST_FLASH = 10_500  # bytes, the codec's included
+MOST_FLASH = 12_000  # bytes, the codec's included
 
 
 def folder_with_codec(folder: Path) -> Path:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from needed_programs import needs, needs_gcc  # noqa: F401  # handed on to the chip's tests
 from recorded_calls import Layout, layout_of
 
 from node.translation.chip_program import BARE

@@ -10,10 +10,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from chip_tools import compile_replay, layout_of_one, run_program, said_numbers
+from chip_tools import compile_replay, layout_of_one, needs, needs_gcc, run_program, said_numbers
 from chip_worlds import every_world, rough_node
 from drawn_calls import record_drawn_calls
-from needed_programs import needs, needs_gcc
 from recorded_calls import record_calls
 
 from node.translation.c_file import CODE, HEADER, CFiles, write_c_files

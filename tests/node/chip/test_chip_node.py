@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from chip_tools import needs
 from click.testing import CliRunner, Result
-from needed_programs import needs
 from one_node import node_of
 from rough_node import RoughNode
 

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chip_tools import compile_replay, layout_of_one, run_program, said_numbers
+from chip_tools import compile_replay, layout_of_one, needs_gcc, run_program, said_numbers
 from click.testing import CliRunner
-from needed_programs import needs_gcc
 from recorded_calls import NODE, PARAMETERS, SETTINGS, WHOLE, Layout, record_calls
 from test_every_event import FAST, Bench
 

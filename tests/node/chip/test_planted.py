@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chip_tools import compile_replay, run_program
+from chip_tools import compile_replay, needs, needs_gcc, run_program
 from chip_worlds import every_world, smoothed_strings
 from drawn_calls import record_drawn_calls
-from needed_programs import needs, needs_gcc
 from recorded_calls import record_calls
 
 from node.translation.c_file import CODE, HEADER, write_c_files

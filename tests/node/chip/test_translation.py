@@ -5,10 +5,9 @@ from collections.abc import Callable
 
 import chip_kernels
 import pytest
-from chip_tools import run_program
+from chip_tools import needs_gcc, run_program
 from hypothesis import given
 from hypothesis import strategies as st
-from needed_programs import needs_gcc
 
 from node.kernels.record.integer_filter import FIXED_STATE
 from node.translation.c_helpers import helpers_text

@@ -1,0 +1,63 @@
+/* One end of a joint on a chip: signals and ISO-TP in CAN frames, one frame with the controller at a time.
+ *
+ * The end is told of every frame, acknowledgement and time, and asked for the next frame. What must arrive goes by
+ * the link, one payload a frame of ISO-TP; signals go as they are.
+ */
+#ifndef BORECHAIN_CHIP_END_H
+#define BORECHAIN_CHIP_END_H
+
+#include "hop_link.h"
+#include "isotp.h"
+#include "native_receiver.h"
+
+#define CHIP_END_ROOM 640u /* bytes of the largest frame of the link, each way */
+#define CHIP_END_URGENT 128u
+#define CHIP_END_SIGNALS 64u
+#define CHIP_END_NOTHING 255u
+
+/* Of a node, what the end calls. */
+struct chip_end_calls {
+    void *own;
+    void (*on_payload)(void *own, const uint8_t *payload, uint32_t length);          /* by the link, once */
+    void (*on_signals)(void *own, int type, const union native_message *heard);
+};
+
+struct chip_end {
+    struct hop_link link;
+    struct native_receiver native;
+    struct isotp_sender sender;
+    struct isotp_receiver receivers[2]; /* of urgent payloads, which are short, and of all others */
+    struct chip_end_calls calls;
+    uint8_t outgoing[CHIP_END_ROOM];
+    uint8_t incoming[CHIP_END_ROOM];
+    uint8_t urgent[CHIP_END_URGENT];
+    uint8_t signals[CHIP_END_SIGNALS];
+    uint32_t signals_identifier;
+    uint32_t shown_at_ms;   /* the last sign of life */
+    uint32_t told_at_ms;    /* the last header of the link */
+    uint32_t begun_ms;
+    uint32_t nonce;
+    uint32_t wrong;         /* frames of no effect */
+    uint8_t signals_length; /* 0: none wait */
+    uint8_t priorities[2];  /* of the payloads that come in */
+    uint8_t address;
+    uint8_t largest;
+    bool is_in_flight;
+};
+
+void chip_end_begin(
+    struct chip_end *end,
+    const struct chip_end_calls *calls,
+    uint8_t address,
+    uint32_t boot_count,
+    uint8_t largest,
+    uint32_t nonce,
+    uint32_t now_ms);
+/* Signals to go next, in place of those that wait. */
+void chip_end_say(struct chip_end *end, uint32_t identifier, const uint8_t *data, uint8_t length);
+void chip_end_on_frame(struct chip_end *end, uint32_t identifier, const uint8_t *data, uint8_t length, uint32_t now_ms);
+void chip_end_on_acknowledged(struct chip_end *end);
+/* Length of the next frame, CHIP_END_NOTHING where none is due. */
+uint8_t chip_end_next_frame(struct chip_end *end, uint32_t *identifier, uint8_t data[ISOTP_FD], uint32_t now_ms);
+
+#endif
