@@ -77,16 +77,25 @@ def differing(one: np.ndarray, other: np.ndarray) -> dict[str, tuple[int, int]]:
     }
 
 
+def aligned() -> Bench:
+    """One that was aligned before."""
+    bench = known(FIXED)
+    assert bench.tube.align("circle", 1.0) == ""
+    return bench.cycles(1).cycles(120, SLOW).cycles(60)
+
+
 BENCHES: dict[str, Callable[[], Bench]] = {
     "new": lambda: Bench(FIXED),
     "learning": lambda: Bench(FIXED).cycles(20),
     "at rest": lambda: known(FIXED),
+    "aligned": aligned,
     "just stopped": lambda: known(FIXED).cycles(30, FAST).cycles(1),
     "turning": lambda: known(FIXED).cycles(30, FAST),
     "slow": lambda: known(FIXED).cycles(30, SLOW),
     "faulty": lambda: known(FIXED).cycles(90, 0.0, held),
 }
 
+OLD_SUMS = ".aligner.sweeps"  # of the alignment before, cleared as the next one begins; floats round them
 WORK_SPACE = {".filter.gain", ".filter.ph", ".filter.decay", ".filter.gain_q"}  # written before it is read
 
 
@@ -108,10 +117,11 @@ def test_orders_of_an_alignment_are_those_of_python(state: str, orders: OrdersIn
             mine = record_of(bench)
             answer = orders.call("order_alignment", mine, number, round(turns * (1 << 24)))
             assert (answer == 0) == (bench.tube.align(method, turns) == ""), (method, turns, answer)
-            assert differing(mine, record_of(bench)) == {}, (method, turns)
+            found = differing(mine, record_of(bench))
+            assert not [path for path in found if not path.startswith(OLD_SUMS)], (method, turns)
             answers.add(answer)
             go_on(bench, state)
-    assert (0 in answers) == (6 in answers) == (state in ("at rest", "just stopped", "slow")), answers
+    assert (0 in answers) == (6 in answers) == (state in ("at rest", "aligned", "just stopped", "slow")), answers
 
 
 @pytest.mark.parametrize("state", BENCHES)
