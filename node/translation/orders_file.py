@@ -17,7 +17,7 @@ from node.translation.kernel_source import integer_source
 from node.translation.kinds_of_values import INTEGER, ArrayOf, Kind, declare_variable
 
 ORDERS_HEADER, ORDERS_CODE = "borechain_orders.h", "borechain_orders.c"
-NUMBERS: Final = int(EVENTS["ring"].subdtype[0]["numbers"].shape[0])
+NUMBERS: Final = int(EVENTS["ring"].base["numbers"].shape[0])
 ORDERS: Final[dict[str, tuple[Callable[..., Any], tuple[Kind, ...]]]] = {
     "order_survey": (order_survey, (NODES,)),
     "order_record": (order_record, (NODES, INTEGER, INTEGER)),
