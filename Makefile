@@ -14,7 +14,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts bounds kernels kernels-of-floats kernels-of-integers bytecode browser fast tests planted mutation fuzz statistical truth explore lock study studies soak seeds clean wheel test-socketcan test-firmware test-compose
+.PHONY: help rig wheel-to-page test quick check lint types contracts bounds kernels kernels-of-floats kernels-of-integers bytecode browser fast tests planted mutation fuzz statistical truth explore lock study studies soak seeds clean wheel test-socketcan test-firmware test-compose
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-20s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -128,6 +128,9 @@ seeds: $(STAMP)  ## fresh seeds of the gauntlet, SEEDS of them FROM one on
 wheel: $(STAMP)  ## a wheel in dist with kernels compiled for every processor of this machine's family
 	$(BIN)/python deploy/deliver_kernels.py
 	$(BIN)/python -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir dist .
+
+wheel-to-page: wheel  ## how long a newcomer waits: from the wheel to a live page with ten tubes; a quiet machine
+	$(BIN)/python tests/tools/wheel_to_page.py
 
 test-socketcan: $(STAMP)  ## joints on the kernel's own CAN, in a User-Mode Linux; says why where there is none
 	$(BIN)/python tests/tools/socketcan.py

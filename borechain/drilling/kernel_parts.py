@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -33,7 +33,8 @@ def compile_surveys() -> None:
     warm_surveys()
     from node.kernels.arithmetic.angles import from_binary
 
-    from_binary(np.uint32(0))  # of a report
+    word: Any = np.uint32(0)  # of a report
+    from_binary(word)
 
 
 def warm_surveys() -> None:

@@ -56,8 +56,11 @@ def compiled_whole() -> Iterator[None]:
 @contextmanager
 def _outer_alone(depth: _Depth) -> Iterator[None]:
     """No machine code, no wrapper for Python and no place in the cache for what is compiled for another function."""
-    compile_one, add, make = Dispatcher.compile, Dispatcher.add_overload, CPUContext.get_executable
-    wrap, save = BaseLower.create_cpython_wrapper, FunctionCache.save_overload
+    compile_one: Any = Dispatcher.compile
+    add: Any = Dispatcher.add_overload
+    make: Any = CPUContext.get_executable
+    wrap: Any = BaseLower.create_cpython_wrapper
+    save: Any = FunctionCache.save_overload
     inner: dict[Any, list[Any]] = {}  # arguments for which a function was compiled for another
 
     def compile_counted(self: Any, sig: Any) -> Any:
@@ -162,7 +165,9 @@ def _all_below(library: Any) -> list[Any]:
 @contextmanager
 def _cheap_bookkeeping() -> Iterator[None]:
     """Without what numba does for its own statistics: a call back for each of LLVM's functions, texts of types."""
-    kept, shown, are_equal = ffi.lib._lock._cblist[:], Record.__repr__, TargetConfig.__eq__
+    kept = ffi.lib._lock._cblist[:]
+    shown: Any = Record.__repr__
+    are_equal: Any = TargetConfig.__eq__
     said: dict[int, tuple[Any, str]] = {}
 
     def say_once(self: Any) -> str:

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 from node.kernels.record.sensor_record import MAX_IMUS
 from node.translation.c_file import CODE, HEADER
 from node.translation.imu_limit import write_for_imus
+from node.translation.orders_file import ORDERS_CODE, ORDERS_HEADER, write_order_files
 from node.translation.toolchains import CodeSize, compile_step, find_tool
 
 SIZES: Final = "borechain_step.sizes.txt"
@@ -61,8 +62,9 @@ def build_firmware(request: FirmwareRequest) -> BuiltFirmware:
         find_tool(request.target, "gcc")
     written = write_for_imus(request.imus)
     request.out.mkdir(parents=True, exist_ok=True)
-    files = [request.out / HEADER, request.out / CODE]
-    for path, text in zip(files, (written.header, written.code), strict=True):
+    orders = write_order_files(written.digest)
+    files = [request.out / name for name in (HEADER, CODE, ORDERS_HEADER, ORDERS_CODE)]
+    for path, text in zip(files, (written.header, written.code, *orders), strict=True):
         path.write_text(text, encoding="utf-8")
     size, memory = None, record_memory(written.header)
     if request.target != "c":

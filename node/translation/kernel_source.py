@@ -82,7 +82,9 @@ def _tree_of(plain: Callable[..., Any]) -> tuple[ast.FunctionDef, str]:
     if not isinstance(tree, ast.FunctionDef):
         raise UntranslatableKernelError(f"{plain!r}: expected a function, got {type(tree).__name__}")
     ast.increment_lineno(tree, first - 1)
-    return tree, f"{'/'.join(Path(inspect.getfile(plain)).parts[-4:])}:{tree.lineno}"
+    parts = Path(inspect.getfile(plain)).parts[-4:]
+    inside = parts[parts.index("node") :] if "node" in parts else parts  # whatever folder holds the package
+    return tree, f"{'/'.join(inside)}:{tree.lineno}"
 
 
 def _taken_for_integers(tree: ast.FunctionDef) -> ast.expr | None:

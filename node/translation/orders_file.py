@@ -1,0 +1,101 @@
+"""Orders to a node in C, and its events: two files beside those of the step, whose records they work on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+from node.kernels.record.node_record import EVENTS
+from node.translation.c_file import HEADER, NODES
+from node.translation.c_helpers import helpers_text
+from node.translation.c_lines import break_line
+from node.translation.c_program import CProgram
+from node.translation.c_structs import PREFIX, CStructs
+from node.translation.c_value import c_word
+from node.translation.chip_orders import next_event, order_alignment, order_record, order_survey
+from node.translation.kernel_source import integer_source
+from node.translation.kinds_of_values import INTEGER, ArrayOf, Kind, declare_variable
+
+ORDERS_HEADER, ORDERS_CODE = "borechain_orders.h", "borechain_orders.c"
+NUMBERS: Final = int(EVENTS["ring"].base["numbers"].shape[0])
+ORDERS: Final[dict[str, tuple[Callable[..., Any], tuple[Kind, ...]]]] = {
+    "order_survey": (order_survey, (NODES,)),
+    "order_record": (order_record, (NODES, INTEGER, INTEGER)),
+    "order_alignment": (order_alignment, (NODES, INTEGER, INTEGER)),
+    "next_event": (next_event, (NODES, ArrayOf(INTEGER, (NUMBERS,)))),
+}
+ANSWERS: Final = """\
+enum borechain_answer { /* to an order */
+    BORECHAIN_TAKEN = 0,
+    BORECHAIN_OUT_OF_RANGE = 1,
+    BORECHAIN_NOT_STANDING = 2, /* it turns, or has not stood still for long enough */
+    BORECHAIN_NO_BIAS = 3,      /* the static bias is not known yet */
+    BORECHAIN_FAULTY = 4,       /* a sensor is */
+    BORECHAIN_TOO_FAST = 5,
+    BORECHAIN_UNDER_WAY = 6     /* an alignment is */
+};
+"""
+
+
+class OrderFiles(NamedTuple):
+    """Texts of ``ORDERS_HEADER`` and ``ORDERS_CODE``."""
+
+    header: str
+    code: str
+
+
+def write_order_files(digest: str) -> OrderFiles:
+    """The orders of this program in C, for the step of ``digest``: ``write_c_files`` writes it.
+
+    Raises
+    ------
+    UntranslatableKernelError
+        When an order says what is not translated.
+    """
+    program = CProgram(CStructs())
+    prototypes = [_entry(program, name) for name in ORDERS]
+    functions = "\n".join(program.texts)
+    return OrderFiles(_header(prototypes, digest), _code(program.constants_text(), functions))
+
+
+def _entry(program: CProgram, name: str) -> str:
+    """Prototype of an order, whose function is written as it stands."""
+    function, kinds = ORDERS[name]
+    source = integer_source(function)
+    made = program.write(source, kinds, PREFIX + name, static="")
+    arguments = ", ".join(
+        declare_variable(kind, c_word(argument), program.struct_name)
+        for argument, kind in zip(source.arguments, kinds, strict=True)
+    )
+    return f"/* {source.summary} */\n" + break_line(
+        f"{declare_variable(made.returned, made.name, program.struct_name)}({arguments});"
+    )
+
+
+def _header(prototypes: list[str], digest: str) -> str:
+    renamed = "\n".join(f"#define {PREFIX}{name} {PREFIX}{name}_{digest}" for name in ORDERS)
+    return f"""\
+/* Orders to a node in integers, between two steps, and what it has to tell. Written by `borechain firmware build`. */
+#ifndef BORECHAIN_ORDERS_H
+#define BORECHAIN_ORDERS_H
+
+#include "{HEADER}"
+
+{ANSWERS}
+{renamed}
+
+{chr(10).join(prototypes)}
+
+#endif
+"""
+
+
+def _code(constants: str, functions: str) -> str:
+    return f"""\
+/* Orders to a node in integers. Written by `borechain firmware build` from the firmware's own: do not edit. */
+#include "{ORDERS_HEADER}"
+
+{helpers_text(functions)}
+{constants}
+
+{functions}"""
