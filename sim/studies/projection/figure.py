@@ -55,8 +55,10 @@ def _draw_reliability(axes: Axes, rows: list[dict[str, Any]]) -> None:
         )
         share = np.clip(observed / 100.0, 0.5 / number, 1.0 - 0.5 / number)
         bars = 196.0 * np.sqrt(share * (1.0 - share) / number)
-        look = {"marker": MARKERS[1 - place], "color": SERIES[1 - place], "label": f"from {stretch}"}
-        axes.errorbar(stated, observed, bars, ls="", elinewidth=0.8, clip_on=False, **look)
+        marker, color, name = MARKERS[1 - place], SERIES[1 - place], f"from {stretch}"
+        axes.errorbar(
+            stated, observed, bars, ls="", marker=marker, color=color, elinewidth=0.8, clip_on=False, label=name
+        )
     axes.set(xlabel="Chance stated (%)", ylabel="Ended within (%)", xlim=(0.0, 100.0), ylim=(0.0, 100.0))
     axes.set_title("Chance of ending within")
     axes.legend(loc="upper left")
