@@ -67,7 +67,7 @@ RIG_STUDIES: Final = by_name(
                 FIRST,
             ),
             counts="rigs",
-            full=("--seeds 300 --rigs 20",),
+            full=("--seeds 264 --rigs 4",),
             short="--seeds 2 --rigs 2",
         ),
         Study(
@@ -82,7 +82,7 @@ RIG_STUDIES: Final = by_name(
             ),
             counts="rigs",
             drawn=False,
-            full=("--seeds 3 --honest 60",),
+            full=("--seeds 4 --honest 264",),
             short="--seeds 1 --honest 1",
         ),
     ],

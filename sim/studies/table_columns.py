@@ -278,6 +278,7 @@ INSIDE: Columns = (
 )
 RELIABILITY: Columns = (
     ("case", "chance"),
+    ("from", "foreseen from"),
     ("holes", "holes"),
     ("stated_percent", "stated, %"),
     ("observed_percent", "observed, %"),

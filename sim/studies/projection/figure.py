@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from groundstation.report.style import GREY, LIGHT, MARKERS, SERIES, new_figure, styled, tidy_ticks
-from sim.studies.projection.run import INSIDE
+from sim.studies.projection.run import INSIDE, STRETCHES
 
 SCORES = (
     ("score_cm", "as foreseen"),
@@ -47,12 +47,18 @@ def _draw_scores(axes: Axes, rows: list[dict[str, Any]]) -> None:
 
 
 def _draw_reliability(axes: Axes, rows: list[dict[str, Any]]) -> None:
-    stated, observed, number = (
-        np.array([row[key] for row in rows]) for key in ("stated_percent", "observed_percent", "holes")
-    )
     axes.plot([0.0, 100.0], [0.0, 100.0], color=GREY, lw=0.8)
-    share = np.clip(observed / 100.0, 0.5 / number, 1.0 - 0.5 / number)
-    bars = 196.0 * np.sqrt(share * (1.0 - share) / number)
-    axes.errorbar(stated, observed, bars, ls="", marker=MARKERS[0], color=SERIES[0], elinewidth=0.8, clip_on=False)
+    for place, stretch in enumerate(list(STRETCHES)[1:]):
+        stated, observed, number = (
+            np.array([row[key] for row in rows if row["from"] == stretch])
+            for key in ("stated_percent", "observed_percent", "holes")
+        )
+        share = np.clip(observed / 100.0, 0.5 / number, 1.0 - 0.5 / number)
+        bars = 196.0 * np.sqrt(share * (1.0 - share) / number)
+        marker, color, name = MARKERS[1 - place], SERIES[1 - place], f"from {stretch}"
+        axes.errorbar(
+            stated, observed, bars, ls="", marker=marker, color=color, elinewidth=0.8, clip_on=False, label=name
+        )
     axes.set(xlabel="Chance stated (%)", ylabel="Ended within (%)", xlim=(0.0, 100.0), ylim=(0.0, 100.0))
     axes.set_title("Chance of ending within")
+    axes.legend(loc="upper left")

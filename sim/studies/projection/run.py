@@ -27,6 +27,7 @@ GROUNDS = {
 OTHERS_SHARE = 4  # of the holes, that each other ground has
 INSIDE = (93.0, 97.0)  # %, to be reached
 BINS = 10  # of the chances
+STRETCHES = {"every depth": slice(None), "2 m": slice(0, 1), "4 m on": slice(1, None)}  # at 2 m the prior alone speaks
 CM = 100.0
 Job = tuple[str, int, int, int]  # ground, seed, numbers from and to before
 
@@ -49,7 +50,7 @@ def run_study(holes: int, seed: int, step: Step) -> dict[str, Any]:
     -------
     dict
         ``cases``: a row a depth; ``kinds``: the share inside by kind; ``grounds``: by ground; ``reliability``: chances
-        that were stated, and how often it was so.
+        that were stated from all stations, the first and those below, and how often it was so.
     """
     jobs = _jobs(holes, seed)
     with over_cores(len(jobs), step) as run_all:
@@ -64,7 +65,7 @@ def run_study(holes: int, seed: int, step: Step) -> dict[str, Any]:
         "cases": [_depth_row(judged, k) for k in range(STATIONS)],
         "kinds": [_inside_row(name, judged[place :: len(KINDS)]) for place, name in enumerate(KINDS)],
         "grounds": [_inside_row(name, some) for name, some in by_ground.items()],
-        "reliability": _reliability_rows(judged),
+        "reliability": [row for part in STRETCHES for row in _reliability_rows(judged, part)],
     }
 
 
@@ -124,21 +125,21 @@ def _inside_row(name: str, found: list[Foreseen]) -> dict[str, Any]:
     }
 
 
-def _reliability_rows(found: list[Foreseen]) -> list[dict[str, Any]]:
-    """Chances of ending within a limit, in bins: what was stated, and how often it was so.
+def _reliability_rows(found: list[Foreseen], stretch: str) -> list[dict[str, Any]]:
+    """Chances of ending within a limit from some depths, in bins: what was stated, and how often it was so.
 
     A hole is asked from every depth and for every limit, and what it answers is not independent: ``holes`` are those
     that are behind a bin.
     """
-    stated = np.array([one.chances for one in found])
-    came = np.array([np.broadcast_to(one.within, one.chances.shape) for one in found])
+    stated = np.array([one.chances[STRETCHES[stretch]] for one in found])
+    came = np.array([np.broadcast_to(one.within, stated.shape[1:]) for one in found])
     places = np.minimum((stated * BINS).astype(int), BINS - 1)
     rows = []
     for place in range(BINS):
         those = places == place
         if those.any():
             rows.append({
-                "case": f"{100 * place // BINS} to {100 * (place + 1) // BINS} %",
+                "case": f"{100 * place // BINS} to {100 * (place + 1) // BINS} %", "from": stretch,
                 "holes": int(those.any(axis=(1, 2)).sum()), "stated_percent": 100.0 * float(stated[those].mean()),
                 "observed_percent": 100.0 * float(came[those].mean()),
             })  # fmt: skip

@@ -1,0 +1,58 @@
+"""What the committed tables of whole rigs say holds: regions, sharpness, and what becomes of blunders."""
+
+import csv
+import re
+from pathlib import Path
+
+import pytest
+from scipy.stats import binom
+
+RESULTS = Path(__file__).parents[2] / "docs" / "results"
+BY_CHANCE = 1e-3  # of a table whose regions hold what they are to hold, at either end of one column
+OPEN = {"depth errs at every stop"}  # a depth that scatters by 5 cm bends directions by 3 sigma, and is no doubt
+
+
+def committed(name: str) -> list[dict[str, str]]:
+    with (RESULTS / f"{name}.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def rigs_of(study: str, option: str) -> int:
+    """Size with which a study's table was made, by its caption."""
+    found = re.search(rf"`{study} [^`]*--{option} (\d+)", (RESULTS / "README.md").read_text())
+    assert found
+    return int(found[1])
+
+
+@pytest.mark.parametrize("column", ["north", "east", "vertical", "direction", "ellipsoid"])
+def test_regions_hold_93_to_97_percent_within_the_scatter_of_so_many_rigs(column: str) -> None:
+    rigs, rows = rigs_of("set-up", "seeds"), committed("set-up")
+    least, most = binom.ppf([BY_CHANCE / len(rows), 1.0 - BY_CHANCE / len(rows)], rigs, [0.93, 0.97]) / rigs
+    assert len(rows) == 10
+    for row in rows:
+        assert 100.0 * least <= float(row[column]) <= 100.0 * most
+
+
+def test_directions_are_as_sharp_as_they_can_be() -> None:
+    assert all(float(row["ratio"]) <= 1.2 for row in committed("set-up"))
+
+
+def test_no_honest_rig_is_blamed() -> None:
+    (honest,) = (row for row in committed("blunders") if row["case"] == "honest")
+    assert int(honest["rigs"]) == rigs_of("blunders", "honest")
+    assert (honest["named"], honest["missed"], honest["beyond_on_target"]) == ("0", "0", "0")
+
+
+def test_no_blunder_is_beyond_three_sigma_without_a_word_or_on_target() -> None:
+    rows = [row for row in committed("blunders") if row["case"] != "honest"]
+    assert len({row["case"] for row in rows}) >= 25
+    for row in rows:
+        if row["case"] not in OPEN:
+            assert row["missed"] == "0"
+            assert row["beyond_on_target"] == "0" or row["seen_by"]
+
+
+def test_a_hole_that_moved_by_a_tenth_of_a_degree_is_named() -> None:
+    rows = [row for row in committed("blunders") if row["case"] == "hole moves at two stations"]
+    assert [row["size"] for row in rows] == ["0.02 deg", "0.1 deg", "1 deg"]
+    assert all(int(row["named"]) >= 0.95 * int(row["rigs"]) for row in rows[1:])
