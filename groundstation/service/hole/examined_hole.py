@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -156,4 +157,4 @@ class ExaminedHole:
 
 def std_across(variances: Array) -> float:
     """Standard deviation (m) across a hole from variances (3,) to north, east and down: the larger of the level two."""
-    return float(np.sqrt(max(variances[:LEVEL].max(), 0.0)))
+    return math.sqrt(max(*variances[:LEVEL].tolist(), 0.0))  # of hundreds of shares

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from array import array
 from bisect import bisect_left, insort
 from collections.abc import Iterable, Sequence
 from operator import attrgetter
@@ -246,9 +247,10 @@ class SurveyedHole:
         """
         if self._examined[0] != self.version:
             below = self._below
-            station_of_row = np.zeros(len(self._stops), np.intp)
-            for place, one in enumerate(below, 1):
-                station_of_row[one.stops.rows] = place
+            station_of_row, rows = np.zeros(len(self._stops), np.intp), array("I")
+            for one in below:
+                rows += one.stops.rows
+            station_of_row[np.array(rows)] = np.arange(1, len(below) + 1).repeat([one.count for one in below])
             mds = np.array([one.md for one in below])
             try:
                 found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar, self.newest)

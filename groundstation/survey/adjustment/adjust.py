@@ -10,6 +10,7 @@ Kovarianzkomponenten", AVN 86 (1979).
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +27,7 @@ from groundstation.survey.adjustment.equations import (
 )
 from groundstation.survey.adjustment.kernels.observations import add_looks, add_right_sides, linearise_looks
 from groundstation.survey.adjustment.kernels.path_elimination import (
+    eliminate_few,
     eliminate_path,
     reduce_right,
     substitute_path,
@@ -37,6 +39,7 @@ from groundstation.survey.adjustment.sphere import carried_bases, step_about_ver
 from groundstation.survey.adjustment.starting_point import first_start
 
 Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
 Truths = npt.NDArray[np.bool_]
 ITERATIONS = 12  # in which play and bends are learnt; they are left as they stand then
 FURTHER = 8  # of the unknowns alone
@@ -48,6 +51,7 @@ POOR_YAW = 0.05  # rad, standard deviation, from which on a direction goes about
 PART = 0.75  # of the way that variances of legs go at once
 TURNED_BACK = 0.5  # of that, whenever they turn back by more than half of what they were to go
 MANY = 1500  # looks, from which on later steps go by the equations of the first, whose right sides alone are made anew
+TOGETHER = 64  # stations whose squares are summed at once
 NEARER = 0.5  # of the step before it, up to which such a step leads on
 GROSS = 16.27  # chi-square of three beyond which a look counts less: one in a thousand
 
@@ -73,6 +77,7 @@ def adjust_hole(
     path: PathPrior,
     extra: FurtherEffects | None = None,
     start: StartingPoint | None = None,
+    known: Array | None = None,
 ) -> Adjusted:
     """Adjust a hole.
 
@@ -82,6 +87,7 @@ def adjust_hole(
     string, path : what was known before
     extra : further effects, such as blunders that were found
     start : where to begin; by default from the looks alone
+    known : (p, p), of an adjustment of the same string before; by default it is worked out
 
     Raises
     ------
@@ -92,18 +98,19 @@ def adjust_hole(
     now = start or first_start(looks, string, path)
     if len(now.extra) != len(extra.std):
         now = replace(now, extra=np.zeros(len(extra.std)))
-    known, is_learnt = string_information(string, extra), now.is_learnt
+    known, is_learnt = string_information(string, extra) if known is None else known, now.is_learnt
     is_settled = is_learnt  # where it begins: so what is known of each unknown beside the others is no matter
     turns = poor_yaws(looks, len(path.md))
-    is_many, is_near, step = len(looks) >= MANY, False, np.inf  # near: the equations of before lead on
+    is_many, is_near, step = len(looks) >= MANY, False, math.inf  # near: the equations of before lead on
+    solution: LinearSolution | None = None
     is_bent, tried, swing = is_learnt, list[tuple[float, float]](), Swing()
     for again in range(ITERATIONS + FURTHER):
         bases = carried_bases(now.tangents)
         linear = linearise_all(looks, now, bases, extra)
         departure = string_departure(string, now)
-        if is_near:
+        if is_near and solution is not None:
             right_sides = path_right_sides(path, now, bases)
-            solution = solve_again(found.solution, looks, linear, right_sides, -known @ departure, extra)
+            solution = solve_again(solution, looks, linear, right_sides, -known @ departure, extra)
         else:
             solution = solve_equations(looks, linear, path_equations(path, now, bases), known, departure, extra)
         before, step = step, solution.decrement if is_settled else solution.step
@@ -158,10 +165,16 @@ def solve_equations(
     """Solve the normal equations of linearised looks."""
     equations = gather_equations(looks, linear, of_path, known, departure, extra)
     diagonal, tied, coupled, in_common = equations.diagonal, equations.tied, equations.coupled, equations.in_common
-    eliminate_path(diagonal, tied, coupled)
-    wide, size, own = coupled.reshape(-1, coupled.shape[2]), len(known), coupled[:, :, -1]
+    size, own = len(known), coupled[:, :, -1]
     whole = in_common[:size, :size].copy()
-    in_common -= wide.T @ wide
+    if len(looks) < MANY:
+        eliminate_path(diagonal, tied, coupled)
+        wide = coupled.reshape(-1, coupled.shape[2])
+        in_common -= wide.T @ wide
+    else:
+        ends = tube_columns(looks, len(diagonal))
+        eliminate_few(diagonal, tied, coupled, ends, linear.gravity_at)
+        take_squares(coupled, ends, linear.gravity_at, in_common)
     left = InCommon(in_common[:size, :size], in_common[:size, size])
     states = (own - coupled[:, :, :size] @ left.step)[:, :, None].copy()
     substitute_path(diagonal, tied, states)
@@ -169,6 +182,31 @@ def solve_equations(
     return LinearSolution(
         diagonal, tied, coupled[:, :, :size], left, states[:, :, 0], gain, equations.at_station, whole
     )
+
+
+def tube_columns(looks: Looks, count: int) -> Places:
+    """Columns (count,) of tubes from each on are zero at each station and below: no such tube has come there."""
+    highest = np.full(count, -1)
+    np.maximum.at(highest, looks.station, looks.tube)
+    return np.asarray(OF_TUBE * (1 + np.maximum.accumulate(highest[::-1])[::-1]), np.intp)
+
+
+def take_squares(coupled: Array, ends: Places, tail: int, in_common: Array) -> None:
+    """Take C^T C, of what is coupled (s + 1, 4, r), from ``in_common`` (r, r), without the columns that are zero.
+
+    Parameters
+    ----------
+    ends, tail : see ``eliminate_few``
+    """
+    for begin in range(0, len(coupled), TOGETHER):
+        some, end = coupled[begin : begin + TOGETHER], int(ends[begin])
+        kept = np.concatenate([some[:, :, :end], some[:, :, tail:]], axis=2)
+        flat = kept.reshape(-1, kept.shape[2])
+        squares = flat.T @ flat
+        in_common[:end, :end] -= squares[:end, :end]
+        in_common[:end, tail:] -= squares[:end, end:]
+        in_common[tail:, :end] -= squares[end:, :end]
+        in_common[tail:, tail:] -= squares[end:, end:]
 
 
 def solve_again(

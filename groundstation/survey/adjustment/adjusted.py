@@ -90,14 +90,15 @@ class Adjusted:
     @cached_property
     def columns(self) -> Array:
         """Change of every state (s + 1, 4, p) for one standard deviation of independent errors in common."""
-        flat = self.by_common.reshape(-1, len(self.common_cov))
-        return np.asarray((flat @ self.common_root).reshape(self.by_common.shape))
+        flat = self.by_common.reshape(-1, self.by_common.shape[2])
+        return self.solution.in_common.times_root(flat).reshape(self.by_common.shape)
 
     @cached_property
     def direction_columns(self) -> Array:
         """Change of every direction (s + 1, 2, p), likewise: half of the work, where curvatures are not asked for."""
-        flat = np.ascontiguousarray(self.by_common[:, :2]).reshape(-1, len(self.common_cov))
-        return np.asarray((flat @ self.common_root).reshape(-1, 2, len(self.common_cov)))
+        width = self.by_common.shape[2]
+        flat = np.ascontiguousarray(self.by_common[:, :2]).reshape(-1, width)
+        return self.solution.in_common.times_root(flat).reshape(-1, 2, width)
 
     @cached_property
     def common_root(self) -> Array:
@@ -149,9 +150,9 @@ class Adjusted:
         right[:, :2] = directions
         reduce_right(self.solution.diagonal, self.solution.tied, right)
         width = right.shape[2]
-        of_path = self.solution.coupled.reshape(-1, len(self.common_cov)).T @ right.reshape(-1, width)
+        of_path = self.solution.coupled.reshape(-1, len(common)).T @ right.reshape(-1, width)
         substitute_path(self.solution.diagonal, self.solution.tied, right)
-        found = self.common_cov @ (common - of_path)
+        found = self.solution.in_common.times_cov(common - of_path)
         states = right + (self.by_common.reshape(-1, len(found)) @ found).reshape(right.shape)
         return states, found
 

@@ -39,7 +39,7 @@ def bent_as_holes_are(found: Adjusted) -> Adjusted:
     for _ in range(ROUNDS):
         whole, legs = expected_curvature(found)
         now = replace(found.now, curvature_var=whole, leg_vars=legs, is_learnt=True)
-        found = adjust_hole(found.looks, found.string, found.path, found.extra, now)
+        found = adjust_hole(found.looks, found.string, found.path, found.extra, now, found.known)
     return found
 
 

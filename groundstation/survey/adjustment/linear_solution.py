@@ -62,6 +62,20 @@ class InCommon:
 
         return np.triu(lapack.dtrtri(self.factor, lower=1)[0].T)
 
+    def times_cov(self, columns: Array) -> Array:
+        """Covariance times columns (p, r)."""
+        if len(self.right) < WIDE:
+            return np.asarray(self.cov @ columns)
+        return np.asarray(self.root @ (self.root.T @ columns))
+
+    def times_root(self, rows: Array) -> Array:
+        """Rows (r, p) times the root."""
+        if len(self.right) < WIDE:
+            return np.asarray(rows @ self.root)
+        from scipy.linalg import blas
+
+        return np.asarray(blas.dtrmm(1.0, self.root, rows.T, trans_a=1).T)
+
     def with_right(self, right: Array) -> InCommon:
         """The same equations with another right side; what was worked out of them is known."""
         made = InCommon(self.information, right)

@@ -10,6 +10,7 @@ from groundstation.survey.adjustment.kernels.carried_bases import carry_bases
 Array = npt.NDArray[np.float64]
 Truths = npt.NDArray[np.bool_]
 TINY = 1e-12
+NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])  # of three axes those after each
 LARGE_TURN = 1.0  # rad, of an azimuth in one step, beyond which a turn about the vertical is no way there
 
 
@@ -23,7 +24,7 @@ def carried_bases(tangents: Array) -> Array:
     first = np.array([1.0, 0.0, 0.0]) if abs(d[0]) < 0.9 else np.array([0.0, 0.0, -np.sign(d[0])])
     north = first - (first @ d) * d
     bases[0, 0] = north / np.linalg.norm(north)
-    bases[0, 1] = np.cross(d, bases[0, 0])
+    bases[0, 1] = d[NEXT] * bases[0, 0, LAST] - d[LAST] * bases[0, 0, NEXT]  # their cross product
     carry_bases(tangents, bases)
     return bases
 
@@ -32,17 +33,17 @@ def bends_between(tangents: Array, bases: Array) -> Array:
     """Bend (s, 2), rad, from each direction to the next along the great circle, in the basis of the former."""
     before, after = tangents[:-1], tangents[1:]
     across = np.einsum("kai,ki->ka", bases[:-1], after)
-    size = np.linalg.norm(across, axis=1)
+    size = np.sqrt(np.add.reduce(across * across, axis=1))
     angle = np.arctan2(size, np.einsum("ki,ki->k", before, after))
     return np.asarray(across * np.where(size > TINY, angle / np.maximum(size, TINY), 1.0)[:, None])
 
 
 def step_directions(tangents: Array, bases: Array, steps: Array) -> Array:
     """Directions (s, 3) after a step (s, 2), rad, along a great circle from each."""
-    angle = np.linalg.norm(steps, axis=1, keepdims=True)
+    angle = np.sqrt(np.add.reduce(steps * steps, axis=1, keepdims=True))
     toward = np.einsum("ka,kai->ki", steps, bases) * np.sinc(angle / np.pi)
     moved = np.cos(angle) * tangents + toward
-    return np.asarray(moved / np.linalg.norm(moved, axis=1, keepdims=True))
+    return np.asarray(moved / np.sqrt(np.add.reduce(moved * moved, axis=1, keepdims=True)))
 
 
 def step_about_vertical(tangents: Array, bases: Array, steps: Array, turns: Truths) -> Array:

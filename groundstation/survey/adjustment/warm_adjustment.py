@@ -8,6 +8,7 @@ from groundstation.survey.adjustment.kernels.carried_bases import carry_bases
 from groundstation.survey.adjustment.kernels.free_parts import free_parts
 from groundstation.survey.adjustment.kernels.observations import add_looks, add_right_sides, linearise_looks
 from groundstation.survey.adjustment.kernels.path_elimination import (
+    eliminate_few,
     eliminate_path,
     path_covariances,
     reduce_right,
@@ -40,6 +41,7 @@ def warm_adjustment() -> None:
     )  # fmt: skip
     diagonal, tied, coupled = np.eye(4)[None].copy(), np.zeros((1, 4, 4)), np.zeros((1, 4, width + 1))
     eliminate_path(diagonal, tied, coupled)
+    eliminate_few(np.eye(4)[None].copy(), tied, coupled.copy(), first, 6)
     reduce_right(diagonal, tied, coupled)
     substitute_path(diagonal, tied, coupled)
     path_covariances(diagonal, tied, np.zeros((1, 4, 4)))

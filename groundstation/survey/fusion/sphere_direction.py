@@ -43,9 +43,15 @@ class SphereDirection(Direction):
     def __init__(
         self, tangent: Array, own: Array, packed: Packed, yaw_vars: tuple[float, float] = (0.0, 0.0), bow: Array = SURE
     ) -> None:
-        named = {"lean": tangent[:2], "down": float(tangent[2]), "cov": own[:2, :2], "own": own, "packed": packed}
-        for name, value in (named | {"tangent": tangent, "yaw_vars": yaw_vars, "bow": bow}).items():
-            object.__setattr__(self, name, value)
+        put = object.__setattr__  # one by one: a long hole makes hundreds at every stop
+        put(self, "lean", tangent[:2])
+        put(self, "down", float(tangent[2]))
+        put(self, "cov", own[:2, :2])
+        put(self, "own", own)
+        put(self, "packed", packed)
+        put(self, "tangent", tangent)
+        put(self, "yaw_vars", yaw_vars)
+        put(self, "bow", bow)
 
     @property
     def shared(self) -> Array:

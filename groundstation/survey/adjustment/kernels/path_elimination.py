@@ -14,6 +14,7 @@ import numpy.typing as npt
 from node.kernels.arithmetic.jit import allocating_kernel, kernel
 
 Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
 
 
 @kernel
@@ -33,6 +34,47 @@ def eliminate_path(diagonal: Array, tied: Array, coupled: Array) -> None:
         if j > 0:
             take_product(tied[j], tied[j], diagonal[j - 1])
             take_product(tied[j], coupled[j], coupled[j - 1])
+
+
+@kernel
+def eliminate_few(diagonal: Array, tied: Array, coupled: Array, ends: Places, tail: int) -> None:
+    """Factorise the chain in place where most of B is zero; the same as ``eliminate_path`` bit for bit.
+
+    Parameters
+    ----------
+    diagonal, tied, coupled : as of ``eliminate_path``
+    ends : (s + 1,), columns of B from each on to before ``tail`` are zero there and further down; they do not grow
+    tail : from which on any column may be other than zero
+    """
+    for j in range(len(diagonal) - 1, -1, -1):
+        factorise_block(diagonal[j])
+        divide_by_factor(diagonal[j], tied[j])
+        divide_columns(diagonal[j], coupled[j], 0, ends[j])
+        divide_columns(diagonal[j], coupled[j], tail, coupled.shape[2])
+        if j > 0:
+            take_product(tied[j], tied[j], diagonal[j - 1])
+            take_columns(tied[j], coupled[j], coupled[j - 1], 0, ends[j])
+            take_columns(tied[j], coupled[j], coupled[j - 1], tail, coupled.shape[2])
+
+
+@kernel
+def divide_columns(lower: Array, right: Array, begin: int, end: int) -> None:
+    """Put L^-1 R in the place of some columns of R (4, r)."""
+    for a in range(4):
+        for i in range(a):
+            for b in range(begin, end):
+                right[a, b] -= lower[a, i] * right[i, b]
+        for b in range(begin, end):
+            right[a, b] /= lower[a, a]
+
+
+@kernel
+def take_columns(one: Array, other: Array, out: Array, begin: int, end: int) -> None:
+    """Take some columns of M^T N, of (4, 4) and (4, r), from those of ``out``."""
+    for a in range(4):
+        for i in range(4):
+            for b in range(begin, end):
+                out[a, b] -= one[i, a] * other[i, b]
 
 
 @kernel
