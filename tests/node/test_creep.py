@@ -112,7 +112,7 @@ def test_a_rest_too_short_to_be_looked_at_takes_no_doubt_back() -> None:
 @pytest.mark.parametrize("angle_deg", [0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.2])
 @pytest.mark.parametrize("within_s", [1.0, 3.0])
 def test_what_is_in_doubt_covers_the_turn_and_is_no_more_than_it(angle_deg: float, within_s: float) -> None:
-    """Over the first ten cycles the noise of a healthy gyroscope is 0.02 deg at most: three times that is in doubt."""
+    """Over the first ten cycles the noise of a healthy gyroscope is 0.02 deg at most: 3.5 times that is in doubt."""
     doubt = Resting().rest(run_on(angle_deg, within_s)[:10]).doubt_deg
     assert doubt == 0.0 or angle_deg / 3.0 < doubt < 1.05 * angle_deg
     assert doubt > 0.0 or angle_deg < 0.07
@@ -122,7 +122,7 @@ def test_the_doubt_grows_with_the_turn() -> None:
     doubts = [Resting().rest(run_on(angle, 2.0)[:10]).doubt_deg for angle in np.linspace(0.02, 0.15, 27)]
     assert doubts == sorted(doubts)
     shares = [doubt / angle for doubt, angle in zip(doubts, np.linspace(0.02, 0.15, 27), strict=True) if doubt]
-    assert 0.3 < shares[0] < 0.6, "by its chance"
+    assert 0.4 < shares[0] < 0.75, "by its chance"
     assert shares[-1] == pytest.approx(1.0, abs=0.05)
 
 

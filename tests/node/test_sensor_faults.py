@@ -164,7 +164,10 @@ def test_a_rest_decides_whose_a_small_step_was(goes_away: bool) -> None:
     apart = math.sqrt(float(string.tube.state["systematic_var"]))
     assert 0.5 * found < apart / (dps * DEG * PERIOD) < found + 1.5
     string.advance(40)
-    left, twist = math.sqrt(float(string.tube.state["systematic_var"])), string.string.nodes[0]["guard"]["ramp"]["doubt"]
+    left, twist = (
+        math.sqrt(float(string.tube.state["systematic_var"])),
+        string.string.nodes[0]["guard"]["ramp"]["doubt"],
+    )
     assert math.sqrt(float(twist)) == pytest.approx(apart if goes_away else 0.0)
     assert left > 0.99 * apart if goes_away else left == 0.0
 

@@ -11,8 +11,8 @@ constant part, which b becomes, and N the noise.
 Of a Gauss-Markov bias f = (1 - e^-x) / x, and h = 2 / x - (3 - 4 e^-x + e^-2x) / x^2 with x = t / tau, which is x / 2.1
 but for 0.04, at most 3/8. Where A is beyond that it is in doubt whether the string turned: its square, times the chance
 that it did, is systematic variance of the yaw, of which the end of every rest leaves half. Of z sigmas that chance is
-taken as (z^2 - 6) / 19 from z = 3 on: from five on it is certain, and at three, which one honest rest in forty shows,
-the variance still covers A with 2.5 sigmas.
+taken as (z^2 - 6) / 19 from z = 3.5 on: from five on it is certain, and at 3.5, which one honest rest in two hundred
+shows, the variance still covers A with 1.8 sigmas.
 
 Two witnesses are asked. The *other axes*: a sensor that warms up, or feels another force, moves all its biases, a
 string none of those across. *Gravity*: of a tube that leans by I the tool face, the mean of eight samples against that
@@ -64,8 +64,7 @@ DECAY: Final = factor_quantity(math.exp(-PERIOD / 15.87))  # of the part of a bi
 WANDERS: Final = 64  # cycles, in units of which h is the time: 2.1 time constants
 WANDERED: Final = 24  # cycles, after which it grows no more
 SHOWN: Final = 5  # sigmas of a turn, which chance does not make however many rests there are
-LEAST_SHOWN: Final = 3  # likewise, from where it is in doubt
-TWICE_FELT: Final = 7  # twice the sigmas of one that gravity shows alone, of many looks in a rest
+TWICE_LEAST: Final = 7  # likewise, twice the sigmas from where it is in doubt
 UNCERTAIN: Final = 6  # squares of sigmas that show nothing
 TOLD: Final = 9  # sigmas of one that is told: a scale that was learnt wrongly leaves a bias that is eight of them off
 BEYOND: Final = 3  # sigmas, of what is not noise
@@ -92,7 +91,7 @@ def follow_creep(node: Any, settings: Any) -> None:
         return
     take_cycle(node, (state.cycles - 2) % RING)
     if has_sensor_moved(node, BEYOND):
-        if abs(creep.angle[2]) > LEAST_SHOWN * turn_std(node, 2):  # what it had shown before they moved stays
+        if 2 * abs(creep.angle[2]) > TWICE_LEAST * turn_std(node, 2):  # what it had shown before they moved stays
             withdraw_doubt(node)
     elif 1 < creep.cycles < LONGEST:
         judge_turn(node, settings)
@@ -196,7 +195,7 @@ def judge_turn(node: Any, settings: Any) -> None:
             withdraw_doubt(node)
             return
         take_witness(node, std, abs(felt), felt_std)
-    if angle > SHOWN * std or (angle > LEAST_SHOWN * std and not has_sensor_moved(node, ALONE)):
+    if angle > SHOWN * std or (2 * angle > TWICE_LEAST * std and not has_sensor_moved(node, ALONE)):
         doubt_turn(node, angle, turned_chance(angle, std))
     if creep.doubted == 1 and angle > TOLD * std and creep.cycles >= 2 * QUICK:
         creep.doubted = 2
@@ -220,7 +219,7 @@ def take_witness(node: Any, std: float, felt: float, felt_std: float) -> None:
     It shows what the string turned by between the middles of two means; over the whole rest it turned as evenly.
     """
     creep = node.guard.creep
-    if felt_std < factor_of(std, ANGLE_Q) and 2 * felt > TWICE_FELT * felt_std:
+    if felt_std < factor_of(std, ANGLE_Q) and 2 * felt > TWICE_LEAST * felt_std:
         whole = mean_of_total(creep.cycles * times_factor(RADIAN, felt), creep.cycles - QUICK)
         doubt_turn(node, whole, turned_chance(felt, felt_std))
 
@@ -261,7 +260,7 @@ def tool_face_std(node: Any, settings: Any) -> float:
 
 @kernel
 def turned_chance(angle: float, std: float) -> float:
-    """Chance of a turn (a factor) where the gyroscope shows an ``angle`` above ``LEAST_SHOWN`` times ``std`` (rad)."""
+    """Chance of a turn (a factor) where the gyroscope shows an ``angle`` of at least 3.5 times ``std`` (rad)."""
     part, certain = bounded_ratio(angle, SHOWN * std), ONE + 0 * angle
     if part >= certain:
         return certain

@@ -17,7 +17,14 @@ from typing import Any, Final
 
 from node.kernels.arithmetic.formats import DEG, RATE_Q, VECTOR_Q
 from node.kernels.arithmetic.jit import kernel, kernel_constant
-from node.kernels.arithmetic.operations import angular_root, bounded_ratio, factor_of, is_number, time_of_cycles
+from node.kernels.arithmetic.operations import (
+    angular_root,
+    as_number,
+    bounded_ratio,
+    factor_of,
+    is_number,
+    time_of_cycles,
+)
 from node.kernels.arithmetic.quantity import NONE, ONE, factor_quantity, rate_quantity
 from node.kernels.filter.modes import STATIC_BIAS
 from node.kernels.filter.priors import scale_var
@@ -38,8 +45,8 @@ ENCODER_RATIO = kernel_constant(Code.ENCODER_RATIO)
 @kernel
 def ratio_var(node: Any) -> float:
     """Variance (rad^2) of the yaw by a ratio that is not one."""
-    none = 0 * node.guard.aiding_var
-    return UNIFORM_VAR + none if node.guard.ratio.told == 1 or node.guard.ratio.seen >= OPEN else none
+    none, ratio = 0 * node.guard.aiding_var, node.guard.ratio
+    return as_number(UNIFORM_VAR + none if ratio.told == 1 or ratio.seen >= OPEN else none)
 
 
 @kernel
