@@ -211,11 +211,14 @@ class GauntletRig:
         """Have the crew measure what is doubted, and tell it: depth, joints, which tube it is, north."""
         for name in ("accept_depth", "accept_joints"):  # the first is refused where nothing speaks against the depth
             self.order(name, {"action": "confirm"})
-        doubled = None if self.ground is None else self.ground.model.string.doubled
-        for tube in () if doubled is None else doubled.untold:
+        if self.ground is None:
+            return
+        model = self.ground.model
+        doubled = model.string.doubled
+        for tube in doubled.untold:
             is_upper = doubled.newest(tube).upper == len(TUBES) + 1 - tube
             self.order("same_number", {"tube": str(tube), "which": "upper" if is_upper else "lower"})
-        if self.ground is not None and self.ground.model.rig_alarms.stands("reference", "encoder"):
+        if model.rig_alarms.stands("reference", "encoder"):
             self.order("north", {"action": "tell", "angle_deg": f"{self.world.zero_deg:.6f}", "sigma_deg": "0.5"})
 
     def close(self) -> None:
