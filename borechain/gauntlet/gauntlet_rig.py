@@ -15,7 +15,7 @@ from borechain.drilling.inline import InlineRig
 from groundstation.service.process.ground_process import GroundProcess
 from node.process.tube_process import TubeProcess
 from sim.errors import RigError
-from sim.gauntlet.fault import EVERYBODY, Step
+from sim.gauntlet.fault import EVERYBODY, TUBES, Step
 from sim.gauntlet.faulty_channel import FaultyChannel
 from sim.gauntlet.faulty_disk import FaultyDisk, PowerCutError
 from sim.gauntlet.faulty_stepper import FaultyStepper
@@ -208,10 +208,17 @@ class GauntletRig:
         self.answer_alarms()
 
     def answer_alarms(self) -> None:
-        """Have the crew measure what is doubted, and tell it: depth, joints, north."""
+        """Have the crew measure what is doubted, and tell it: depth, joints, which tube it is, north."""
         for name in ("accept_depth", "accept_joints"):  # the first is refused where nothing speaks against the depth
             self.order(name, {"action": "confirm"})
-        if self.ground is not None and self.ground.model.rig_alarms.stands("reference", "encoder"):
+        if self.ground is None:
+            return
+        model = self.ground.model
+        doubled = model.string.doubled
+        for tube in doubled.untold:
+            is_upper = doubled.newest(tube).upper == len(TUBES) + 1 - tube
+            self.order("same_number", {"tube": str(tube), "which": "upper" if is_upper else "lower"})
+        if model.rig_alarms.stands("reference", "encoder"):
             self.order("north", {"action": "tell", "angle_deg": f"{self.world.zero_deg:.6f}", "sigma_deg": "0.5"})
 
     def close(self) -> None:

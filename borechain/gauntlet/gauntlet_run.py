@@ -29,7 +29,7 @@ ALL = tuple(kind.name for kind in KINDS)
 USUAL = "minute"
 WORTH_A_PROCESS = 50  # seeds, for which a process more is started
 BATCH = 200  # seeds whose outcomes are given at a time
-ANSWERED_AFTER = 20.0  # s of calm, in which the crew sees what the last fault has raised
+ANSWERED_AFTER = (20.0, 40.0)  # s of calm, after which the crew answers what the last fault has raised
 FEW = 2  # kinds of faults that may never mislead the crew without a word, whatever can be seen
 
 
@@ -144,8 +144,9 @@ def _run(rig: GauntletRig, outcome: SeedOutcome, looks: Sequence[Callable[[], No
         rig.drill([step for _, step in steps], look, until if chosen.calm else math.inf)
     if chosen.calm:
         rig.repair()
-        rig.advance(until + ANSWERED_AFTER, look)
-        rig.answer_alarms()
+        for after in ANSWERED_AFTER:
+            rig.advance(until + after, look)
+            rig.answer_alarms()
         rig.advance(math.inf, look)
     outcome.told = observer.told
     if rig.ground is None:

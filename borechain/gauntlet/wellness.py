@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from borechain.gauntlet.gauntlet_rig import BIAS_AFTER, GauntletRig
-from borechain.gauntlet.oracles import is_at_place
+from borechain.gauntlet.oracles import DEPTH_TOLERANCE, is_at_place
 from sim.gauntlet.expected_doubts import misled_by
 from sim.gauntlet.fault import TUBES
 from sim.gauntlet.faulty_world import TUBE_LENGTH
@@ -71,8 +71,12 @@ def _may_stand(rig: GauntletRig, row: Row) -> bool:
 
 
 def _was_missed(rig: GauntletRig, row: Row) -> bool:
-    """A survey that is missing is of an earlier stop, or of a tube that could make none."""
-    is_last = row["subject"].startswith(f"stop at {rig.world.bit_depth(rig.world.end):.2f} m")
+    """A survey that is missing is not there, and of an earlier stop, or of a tube that could make none."""
+    md, tubes = float(row["subject"].split()[2]), _numbers(row["detail"])
+    places = [(tube, md - TUBE_LENGTH * (tube - 1)) for tube in tubes]
+    if any(is_at_place((tube, one["md_m"]), places) for tube in tubes for one in _measured(rig, tube)):
+        return False
+    is_last = abs(md - rig.world.bit_depth(rig.world.end)) <= DEPTH_TOLERANCE
     return (
         not is_last or set(_numbers(row["detail"])) <= unready_tubes(rig) or "depth" in misled_by(rig.world.deceptions)
     )

@@ -24,6 +24,7 @@ class BootCounter:
     lot : random number below its argument, for a start that cannot be counted
     disk : that holds the folder
     is_new : a folder without a count is a new one, whose starts count from 1; otherwise the count may have been lost
+    is_own : the folder is that of the process; of another's starts its own cannot be counted on
 
     Attributes
     ----------
@@ -38,11 +39,12 @@ class BootCounter:
         disk: Disk = MACHINE,
         *,
         is_new: bool = True,
+        is_own: bool = True,
     ) -> None:
         self.fault = ""
         try:
             self.boots = read_count(disk, folder / "boots") + 1
-            if self.boots == 1 and not is_new:
+            if not is_own or (self.boots == 1 and not is_new):
                 self.boots = LOTS + lot(LOTS)
         except (ValueError, OSError) as error:
             self.fault, self.boots = f"boots: {error}", LOTS + lot(LOTS)

@@ -41,6 +41,7 @@ class Saver:
     Attributes
     ----------
     fault : why nothing was loaded although there was something, or empty
+    is_of_another : what was there is another tube's
     due : what must not be lost waits for the end of this cycle or frame
     """
 
@@ -55,6 +56,7 @@ class Saver:
         self._told_refused = False
         self._told_worn = 0
         self.fault = ""
+        self.is_of_another = False
         self.due = False
 
     @property
@@ -75,6 +77,7 @@ class Saver:
         owner = None if saved is None or self._tube is None else owner_of(saved[1])
         if owner not in (None, self._tube):
             self.fault = f"it is that of tube {owner}: was a board, a card or a folder exchanged?"
+            self.is_of_another = True
             return None
         self._saved_still = saved is not None and is_still(saved[0])
         return saved

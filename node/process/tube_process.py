@@ -116,13 +116,13 @@ class TubeProcess(Process):
             config = sensor_config(settings, parameters) if imus else default_config()
         self.config = config
         self._saver = Saver(folder, disk, settings.tube)
+        saved = self._saver.load()
         # apart from the saved state: a node that lost its state must not look like an earlier boot
-        counter = BootCounter(folder, disk=disk)
+        counter = BootCounter(folder, disk=disk, is_own=not self._saver.is_of_another)
         self.boots, self._counter_fault = counter.boots, counter.fault
         self._log = SurveyLog(folder, disk)
         self._dropped = 0
         self._looked_at_drops = -math.inf
-        saved = self._saver.load()
         self.nodes, telemetry = saved if saved else (new_node(self.config), None)
         self._cut = resume_node(self.nodes, self.config) if saved else False
         self._fallback = "; ".join(store.faults)

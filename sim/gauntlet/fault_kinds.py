@@ -135,7 +135,7 @@ ANSWERS: dict[str, str] = {
     "surveys-lost": "earlier surveys cannot be sent again; new ones are kept",
     "node-disk-refuses": "it goes on and relays, sets a flag and tries again every 30 s",
     "ground-disk-refuses": "the ground station answers from it and receipts nothing; the tubes repeat until it accepts",
-    "folders-swapped": "messages carry the number of their tube; yaws are taken from the encoder",
+    "folders-swapped": "the memory of another tube is refused by its number; each starts as new",
     "same-number": "numbers of two series are kept apart by their content",
     "database-deleted": "the string is learnt anew; the tubes are asked for what is missing",
     "database-old": "the tubes are asked for the numbers that the backup lacks",

@@ -243,6 +243,7 @@ def test_a_memory_of_another_tube_is_refused_by_name(tmp_path: Path) -> None:
     assert process._saver.fault == "it is that of tube 2: was a board, a card or a folder exchanged?"
     assert process.endpoint.mail.outbox_size == 0
     assert not process.tube._restored
+    assert process.boots >= LOTS  # of the other's starts its own are not counted on
 
 
 def test_the_same_tube_goes_on_with_its_memory(tmp_path: Path) -> None:

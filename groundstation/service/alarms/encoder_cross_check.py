@@ -52,7 +52,7 @@ class EncoderCrossCheck:
         self._elsewhere: dict[int, Event] = {}  # newest start upon a yaw of another place, by tube
         self._said: dict[int, deque[Event]] = {}  # newest events, by tube
         self._told: tuple[Event, ...] = ()
-        self._told_blank: list[Event] = []
+        self._told_blank: deque[Event] = deque(maxlen=STARTS_KEPT)  # starts without a yaw that were told of
         self._spans: dict[int, tuple[float, float]] = {}  # s, first and last event of each epoch
 
     def on_event(self, event: Event, heard: Collection[int]) -> str:
@@ -109,14 +109,14 @@ class EncoderCrossCheck:
             if start is None or not _is_blank(start):
                 return ""  # the usual case, found at the first tube
             blank.append(start)
-        if not blank or blank == self._told_blank:
+        if all(start in self._told_blank for start in blank):
             return ""
         newest = max(blank, key=_in_time)
         if newest.epoch == epoch and rig_now < newest.at + SETTLED_AFTER:
             return ""
         if not all(self._is_beside(one, newest) for one in blank):
             return ""
-        self._told_blank = blank
+        self._told_blank.extend(blank)
         return f"no tube watched it before {newest.at:.0f} s: none has kept its yaw"
 
     def _judge(self, heard: Collection[int]) -> str:

@@ -110,7 +110,9 @@ class KnownString:
         """Handle a node's state that came at ``now`` (s, own clock); False of one that is no news."""
         is_newest = self.states.on_state(state, now)
         if is_newest:
-            if state.tube not in self.tally.tubes and now < self._tubes_known_at:
+            # a tube may be known by a survey that came before the first state
+            is_new = state.tube not in self.tally.tubes or math.isinf(self._tubes_known_at)
+            if is_new and now < self._tubes_known_at:
                 self._tubes_known_at = now + ALL_HEARD_WITHIN
             self._on_hops(state.tube, state.hops)
         return is_newest is not None
