@@ -64,7 +64,8 @@ def dense_solution(drawn: DrawnString, now: StartingPoint, extra: FurtherEffects
         row[:, count - len(extra.std) :] = extra.columns[k]
         whole += row.T @ linear.weights[k] @ row
         side += row.T @ linear.weights[k] @ linear.residuals[k]
-    return np.linalg.solve(whole, side), np.linalg.inv(whole)
+    step, cov = np.linalg.solve(whole, side), np.linalg.inv(whole)
+    return np.asarray(step, np.float64), np.asarray(cov, np.float64)
 
 
 @settings(max_examples=6, deadline=None)
