@@ -63,7 +63,7 @@ def test_a_node_of_one_imu_fits_a_small_chip(tmp_path: Path) -> None:
     lines = (tmp_path / "borechain_step.sizes.txt").read_text().splitlines()
     sizes = dict(line.split() for line in lines)
     assert int(sizes["flash_bytes"]) <= 115_000
-    assert int(sizes["data_bytes"]) + int(sizes["zeroed_bytes"]) + int(sizes["records_bytes"]) <= 17_500
+    assert int(sizes["data_bytes"]) + int(sizes["zeroed_bytes"]) + int(sizes["records_bytes"]) <= 17_600
     page = (Path(__file__).parents[1] / "docs" / "board.md").read_text()
     told = re.findall(r"^\| cortex-m4 \| 1 \| ([0-9.]+) \| [0-9]+ \| ([0-9.]+) \|", page, re.MULTILINE)
     assert told, "no row of a Cortex-M4 with one IMU: python docs/make_board.py"

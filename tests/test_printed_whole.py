@@ -518,13 +518,18 @@ def test_a_speed_is_above_nothing_and_up_to_a_thousand(text: str, speed: float |
 
 @pytest.mark.parametrize(("seed", "numbers"), [(None, [5, 6, 7]), (0, [0]), (9, [9])])
 def test_seeds_are_as_many_as_asked_for_from_the_first_on(seed: int | None, numbers: list[int]) -> None:
-    assert GauntletRequest(3, 5, seed, None, None, "minute").numbers == numbers
+    assert GauntletRequest(3, 5, seed, None, None, "minute", None, False, False).numbers == numbers
 
 
 def test_a_gauntlet_tells_how_many_a_minute_of_one_core() -> None:
-    assert printed(lambda: _show_figures(30, 2, 90.0, as_json=False)) == ["30 seeds, 2 failed, 20 a minute of one core"]
-    (line,) = printed(lambda: _show_figures(30, 2, 91.234, as_json=True))
-    assert json.loads(line) == {"seeds": 30, "failed": 2, "cpu_s": 91.23, "runs_per_cpu_minute": 19.7}
+    said = "30 seeds, 2 failed, 20 a minute of one core"
+    assert printed(lambda: _show_figures(30, 2, 90.0, None, as_json=False)) == [said]
+    assert printed(lambda: _show_figures(30, 2, 90.0, 7, as_json=False)) == [f"{said}, 7 pairs of facts"]
+    figures = {"seeds": 30, "failed": 2, "cpu_s": 91.23, "runs_per_cpu_minute": 19.7}
+    (line,) = printed(lambda: _show_figures(30, 2, 91.234, None, as_json=True))
+    assert json.loads(line) == figures
+    (line,) = printed(lambda: _show_figures(30, 2, 91.234, 7, as_json=True))
+    assert json.loads(line) == figures | {"pairs": 7}
 
 
 @pytest.mark.parametrize(

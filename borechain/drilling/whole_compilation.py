@@ -131,7 +131,8 @@ class _Linked:
     """One library as ``finalize`` takes it; what was only lowered is linked as it is."""
 
     def __init__(self, library: Any) -> None:
-        self._library, self._reload_init = library, library._reload_init
+        self._library = library
+        self._reload_init = getattr(library, "_reload_init", set())  # the lowest numba allowed has none yet
 
     def _get_module_for_linking(self) -> Any:
         if self._library._finalized:

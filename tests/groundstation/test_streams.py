@@ -86,7 +86,6 @@ def test_a_number_of_before_a_restart_is_told_so(rig: Rig) -> None:
     [
         ("stations/99", "stations/99: no such number; of stations/{n} there are 1, 2, 3"),
         ("nodes/7", "nodes/7: no such number; of nodes/{tube} there are 1, 2, 3"),
-        ("orders/7", "orders/7: no such number; of orders/{n} there are none yet"),
         ("statoins", "statoins: no such path; expected one of status, verdict"),
     ],
 )
@@ -94,6 +93,20 @@ def test_what_is_not_there_is_refused_with_what_is(rig: Rig, path: str, expected
     with pytest.raises(SelectorError) as caught:
         rig.ask(path)
     assert str(caught.value).startswith(expected)
+
+
+def test_of_what_is_missing_an_order_was_given_and_before_there_was_none(rig: Rig, tmp_path: Path) -> None:
+    """The numbers of its events begin at 101, so a tube is asked for those between at once."""
+    (order,) = rig.ask("orders")["orders"]
+    assert (order["command"], order["tube"]) == ("resend", 1)
+    with pytest.raises(SelectorError, match=f"^orders/7: no such number; of orders/{{n}} there are {order['order']}"):
+        rig.ask("orders/7")
+    (folder := tmp_path / "new").mkdir()
+    new = Rig(folder, target=20.0)
+    new.run(5.0)
+    with pytest.raises(SelectorError, match=r"^orders/7: no such number; of orders/\{n\} there are none yet"):
+        new.ask("orders/7")
+    new.ground.close()
 
 
 @pytest.mark.slow

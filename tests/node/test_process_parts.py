@@ -12,6 +12,7 @@ import pytest
 from node.firmware.tube_settings import PassedTube
 from node.process.tube_process import MAX_CLOCK_STD, REPORT_EVERY, RESENT_TOGETHER, SYNCHRONISED_STD, TubeProcess
 from telemetry.messages import Aiding, Event, NodeFlag, NodeMode, NodeState, Severity, Side, StaticRecord
+from telemetry.presentation.msgpack_codec import encode_message
 
 
 def process_of(**parts: Any) -> Any:
@@ -133,14 +134,23 @@ def test_a_full_queue_is_told_at_most_once_a_minute_with_what_was_dropped_since(
 @pytest.mark.parametrize("count", [0, 1, RESENT_TOGETHER, RESENT_TOGETHER + 5])
 def test_what_is_asked_for_again_is_sent_so_many_at_a_time_and_saved_before(count: int) -> None:
     sent: list[Any] = []
+    kept = {n: encode_message(Event(7, n, 1.0, Severity.INFO, "booted")) for n in range(1, count + 1)}
+    foreign = encode_message(Event(8, 2, 1.0, Severity.INFO, "booted"))  # of the memory of another tube
     log = SimpleNamespace(
-        payloads=lambda first, last: [(n, bytes([n])) for n in range(first, last + 1)], complete_from=4
+        payloads=lambda first, last: [(2, foreign), *((n, kept[n]) for n in range(first, last + 1))], complete_from=4
     )
-    mail = SimpleNamespace(submit_again=lambda *words: sent.append(words))
+    hastened: list[Any] = []
+    mail = SimpleNamespace(
+        submit_again=lambda *words: sent.append(words),
+        hasten=lambda *words: hastened.append(words) or {1, 1000},
+    )
     saver = SimpleNamespace(due=False)
-    process = process_of(_log=log, endpoint=SimpleNamespace(mail=mail), _saver=saver, _now=12.5)
-    assert process._resend(1, count) == (min(count, RESENT_TOGETHER), 4)
-    assert sent == [(n, bytes([n]), 12.5) for n in range(1, min(count, RESENT_TOGETHER) + 1)]
+    settings = SimpleNamespace(tube=7)
+    process = process_of(_log=log, endpoint=SimpleNamespace(mail=mail), _saver=saver, _now=12.5, settings=settings)
+    numbers = range(1, min(count, RESENT_TOGETHER) + 1)
+    assert process._resend(1, count) == (len({*numbers} | {1, 1000}), 4)  # once each, what waited by itself too
+    assert hastened == [(1, count, 12.5)]
+    assert sent == [(n, kept[n], 12.5) for n in numbers]
     assert saver.due == (count > 0)
 
 

@@ -28,6 +28,7 @@ from telemetry.media.zenoh_bus import open_client
 PAGE = (REPOSITORY / "docs" / "deploy.md").read_text()
 FORCE = (0.3, -0.2, -9.79)  # m/s^2, of a tube that leans by 2.1 deg
 TUBE = 7
+CHECKS = 5  # of a board, at most
 DEPTH_M = 1.6  # within the first tube, which is 2 m long
 DEPTH = "sudo install -o borechain -m 0600 stick/depth.keys"
 RIG = "rig-1"
@@ -81,7 +82,7 @@ class Followed:
             elif borechain := re.fullmatch(r"(?:sudo (?:-[ug] \w+ )*)?borechain (.*)", text):
                 words = shlex.split(borechain[1])
                 own = ["--folder", "/var/lib/borechain"] if words[:2] == ["board", "check"] else []  # its default
-                self.said[text] = self.command(machine, [*words, *own])
+                self.said[text] = self.checked(machine, [*words, *own])
             elif number != 2 or name == "tube" or "warm_up" not in text:
                 machine.shell(text.replace("stick/", f"{self.work}/stick/"), self.work)
                 machine.start_units()
@@ -104,6 +105,14 @@ class Followed:
                 self.said["status"] = str(ended.code or 0)
         return self._capture.readouterr().out
 
+    def checked(self, machine: Machine, words: list[str]) -> str:
+        """What a command prints; a check again where this machine, which has more to do than a board, lost cycles."""
+        for _ in range(CHECKS):
+            said = self.command(machine, words)
+            if "cycles lost" not in said:
+                break
+        return said
+
     def said_of(self, begin: str) -> str:
         return next(said for command, said in self.said.items() if begin in command)
 
@@ -121,7 +130,8 @@ def followed(tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pyt
             stack.callback(machine.end)
         yield page
         page.drilled.set()
-        page.depth.join()
+        if page.depth.ident is not None:
+            page.depth.join()
 
 
 def test_two_boards_come_to_a_survey_by_the_commands_of_the_page(followed: Followed) -> None:

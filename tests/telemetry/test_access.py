@@ -155,11 +155,12 @@ def test_a_source_of_the_depth_as_the_page_writes_it_is_believed(
     buses: dict[str, ZenohBus], endpoint: str, folder: Path
 ) -> None:
     page = (Path(__file__).parents[2] / "docs" / "deploy.md").read_text()
-    lines = page.partition("    from pathlib import Path\n")[2].partition("\n\n## ")[0]
+    lines = page.partition("    from pathlib import Path\n")[2].partition("\n\nThen, ")[0]
     program = textwrap.dedent(f"    from pathlib import Path\n{lines}")
     arrived: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     buses["base"].subscribe(keys.DEPTH.format(rig=RIG), lambda _key, payload: arrived.put(payload))
-    exec(program.replace("tls/surface:7447", endpoint).replace("/etc/borechain", str(folder)), {})
+    told = {"readings": lambda: [(12.5, 3.2)]}
+    exec(program.replace("tls/surface:7447", endpoint).replace("/etc/borechain", str(folder)), told)
     seals = seals_of(folder, BASE, [Side.LOWER])
     assert seals is not None
     reading = decode_message(seals.depth_content(arrived.get(timeout=WAIT)) or b"")

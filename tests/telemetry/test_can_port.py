@@ -238,9 +238,9 @@ def test_a_log_of_a_joint_is_read_by_foreign_tools_from_the_file_alone(
     upper = stack.enter_context(open_medium(f"{where},log={tmp_path / 'joint'}{suffix}")).open_port(UPPER)
     lower = stack.enter_context(open_medium(where)).open_port(LOWER)
     until(lambda: upper.is_up and lower.is_up)
-    arrived: list[bytes] = []
-    lower.listen(arrived.append)
-    link = HopLink(2, 1)
+    link, other = HopLink(2, 1), HopLink(1, 2)
+    arrived: list[Any] = []  # aidings alone: the header of the link comes in a frame of its own
+    lower.listen(lambda frame: arrived.extend(other.receive(frame, 0.0)))
     link.bundle_limit = 0
     sent = [Aiding(0.5 + k, 2e-6, 3e-7, -0.3, 1.2, 1000.0 + k, k, 3) for k in range(5)]
     for k, aiding in enumerate(sent):
@@ -248,6 +248,10 @@ def test_a_log_of_a_joint_is_read_by_foreign_tools_from_the_file_alone(
         for frame in link.take_frames(float(k)):
             upper.send(frame)
         until(lambda k=k: len(arrived) > k)  # type: ignore[misc]
+    heard: list[bytes] = []
+    upper.listen(heard.append)
+    lower.send(PortFrame(b"the last of them has been on the bus"))  # and is in the log before what came later
+    until(lambda: b"the last of them has been on the bus" in heard)
     upper.close()
     database = cantools.database.load_file(str(DBC), frame_id_mask=IDENTIFIER_MASK)
     found = []

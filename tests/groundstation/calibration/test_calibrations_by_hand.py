@@ -231,7 +231,8 @@ def test_temperatures_are_two_where_they_are_more_than_three_kelvin_apart() -> N
     assert told.matrix_std == pytest.approx(fit.matrix_std[0])
     assert told.matrix_slopes_std == pytest.approx(fit.matrix_std[1:])
     assert told.bias_slopes_std == pytest.approx(0.5 * fit.bias_std[1:])
-    block = block_of_fit(fit, 0.5, "gyroscope", told)
+    block = block_of_fit(fit, 0.5, "gyroscope", told, (10.0, 23.05))
+    assert block.valid == (10.0, 23.05)
     assert block.matrix == pytest.approx(np.eye(3))
     assert block.bias == pytest.approx([0.5, 1.0, 1.5])
     assert (block.matrix_slopes, block.bias_slopes) == (

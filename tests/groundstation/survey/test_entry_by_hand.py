@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from groundstation.entry import bounded_text as text_room
 from groundstation.entry.quantity_ranges import RANGES
 from groundstation.entry.station_plausibility import (
     departing_holes,
@@ -24,6 +23,7 @@ from groundstation.survey.adjustment import bends_among_holes as bends_room
 from groundstation.survey.files.instrument_columns import instrument_column
 from groundstation.survey.wall.wall_plausibility import _depths, _overlaps, _touches
 from groundstation.survey.well.north_swing import inward_covs, inward_std
+from telemetry.bounded_bytes import bounded_bytes, bounded_text
 
 BY_HAND = {
     "azimuth_deg": (-720, 720, "deg"), "inclination_deg": (0, 180, "deg"), "declination_deg": (-180, 180, "deg"),
@@ -31,7 +31,8 @@ BY_HAND = {
     "section_azimuth_deg": (-720, 720, "deg"), "gravity": (9, 10.5, "m/s^2"), "field_nt": (15_000, 75_000, "nT"),
     "dip_deg": (-90, 90, "deg"), "latitude_deg": (-90, 90, "deg"), "longitude_deg": (-180, 360, "deg"),
     "height_m": (-1000, 10_000, "m"), "coordinate": (-1e8, 1e8, "m"), "distance": (-1e6, 1e6, "m"),
-    "depth": (-1e5, 1e5, "m"),
+    "depth": (-1e5, 1e5, "m"), "depth_rate": (0.001, 5, "m/s"), "depth_gap": (0.1, 600, "s"),
+    "survey_after": (5, 3600, "s"), "stale_after": (1, 600, "s"), "station_tolerance": (0.001, 1, "m"),
 }  # fmt: skip
 
 
@@ -49,13 +50,13 @@ def test_every_quantity_has_its_range_and_both_ends_of_it() -> None:
             assert f" {unit}, got " in str(no.value)
 
 
-def test_a_file_of_settings_may_be_exactly_as_large_as_it_may(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(text_room, "LARGEST_FILE", 10)
+def test_a_file_may_be_exactly_as_large_as_it_may(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("0123456789")
-    assert text_room.bounded_text(tmp_path / "a") == "0123456789"
+    assert bounded_bytes(tmp_path / "a", 10) == b"0123456789"
+    assert bounded_text(tmp_path / "a") == "0123456789"
     (tmp_path / "a").write_text("0123456789x")
     with pytest.raises(OSError, match="larger than 0 MiB"):
-        text_room.bounded_text(tmp_path / "a")
+        bounded_bytes(tmp_path / "a", 10)
 
 
 def warned(md: list[float], inclination_deg: list[float], azimuth_deg: list[float] | None = None) -> list[Any]:
