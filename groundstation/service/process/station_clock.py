@@ -11,7 +11,7 @@ from telemetry.runtime.steady_time import SteadyTime
 CLOCK_BACK = "clock_back"
 
 
-class StationClock:
+class StationClock(SteadyTime):
     """Time of a machine that goes on where its clock steps back, as that of a restored one does.
 
     Parameters
@@ -21,16 +21,8 @@ class StationClock:
     """
 
     def __init__(self, alarms: RigAlarms, date: Callable[[], float]) -> None:
-        self._alarms, self._date = alarms, date
-        self._steady, self._told_back = SteadyTime(), 0.0
-
-    def follow(self, shown: float) -> float:
-        """Time (s) that it is when the clock shows ``shown`` (s)."""
-        return self._steady.follow(shown)
-
-    def shown_at(self, at: float) -> float:
-        """What the clock shows at a time (s)."""
-        return self._steady.shown_at(at)
+        super().__init__()  # and no clock inside this one: it is followed at all that comes
+        self._alarms, self._date, self._told_back = alarms, date, 0.0
 
     def times_at(self, now: float, rig_now: float) -> Times:
         """The times (s) of an alarm that is raised or cleared now."""
@@ -38,7 +30,7 @@ class StationClock:
 
     def look(self) -> None:
         """Tell by how much the clock has stepped back since it was told last."""
-        if (back := self._steady.back) > self._told_back:
+        if (back := self.back) > self._told_back:
             what = f"it stepped back by {back - self._told_back:.1f} s; times go on from where they were"
             self._alarms.alert(CLOCK_BACK, "clock", what)
             self._told_back = back

@@ -2,9 +2,11 @@
 
 A step of a bias is a further unknown with a wide prior. A turn is so too, and the looks are turned back by what is
 found until nothing more is, for a turn of many degrees is not linear; nor is a wrong depth where the hole bends, and
-what a tilt does hangs on the lean of the hole, which it has spoilt, so columns are made at least twice. What has a
-known size (axes or tubes exchanged) is put right in the looks. Source: Teunissen, "An integrity and quality control
-procedure for use in multi sensor integration", ION GPS (1990): detection, identification, adaptation.
+what a tilt does hangs on the lean of the hole, which it has spoilt, so columns are made at least twice. After some
+rounds only a turn is waited for: a tilt or depth that is not there need not settle (it doubles from round to round, and
+collapses), and some size on that way may fit the looks better than what is wrong. What has a known size (axes or tubes
+exchanged) is put right in the looks. Source: Teunissen, "An integrity and quality control procedure for use in multi
+sensor integration", ION GPS (1990): detection, identification, adaptation.
 """
 
 from __future__ import annotations
@@ -46,6 +48,7 @@ WIDE_FORCE, WIDE_TILT, WIDE_TURN, WIDE_DEPTH = 1.0, 0.2, 3.0, 10.0  # m/s^2, rad
 BENT = (*BY_DEPTH, *BY_TILT, BlunderKind.HOLE_MOVED)  # whose columns are others once the hole stands right
 NOT_SOUGHT = (*KNOWN_SIZE, BlunderKind.COLLAR_WRONG)  # put right in the looks, and left open in the path
 ROUNDS = 16  # a turn of 60 deg takes six
+BENT_ROUNDS = 4  # in which what is bent settles, where it is there
 SETTLED, STRAIGHT = 0.1, 0.01  # standard deviations, and rad or m, of a turn or depth that is found in addition
 
 
@@ -87,7 +90,8 @@ def adjust_with(
         before, sizes = sizes, found.now.extra + np.where(is_turn, sizes, 0.0)
         more = np.abs(sizes - before)
         enough = np.minimum(SETTLED * np.sqrt(np.diag(cov)), STRAIGHT)
-        if again and np.all((more <= enough)[is_turn | is_bent]):
+        awaited = is_turn | is_bent if again + 1 < BENT_ROUNDS else is_turn
+        if again and np.all((more <= enough)[awaited]):
             break
         now = replace(found.now, extra=np.zeros(0))
         turned = _turned_back(looks, run, sought, sizes)
