@@ -132,7 +132,7 @@ class _Linked:
 
     def __init__(self, library: Any) -> None:
         self._library = library
-        self._reload_init = getattr(library, "_reload_init", set())  # the lowest numba allowed has none yet
+        self._reload_init: Any = getattr(library, "_reload_init", set())  # the lowest numba allowed has none yet
 
     def _get_module_for_linking(self) -> Any:
         if self._library._finalized:
