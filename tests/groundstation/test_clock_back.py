@@ -69,6 +69,7 @@ def test_it_is_told_and_nothing_is_lost_or_heard_in_the_future(tmp_path: Path, b
     assert told["detail"].startswith("it stepped back by ")
     # to the half second between two events of this rig
     assert float(told["detail"].split()[4]) == pytest.approx(back, abs=0.6)
+    assert told["count"] == 1  # however often it is looked at
     rig.state(1, 1)
     assert 0.0 <= rig.ask("nodes/1")["age_s"] <= 2.0
     assert not rig.ask("nodes/1")["stale"]
@@ -76,6 +77,11 @@ def test_it_is_told_and_nothing_is_lost_or_heard_in_the_future(tmp_path: Path, b
     rig.run(2.0)
     assert len(rig.ask("measurements")["measurements"]) == 2
     assert rig.tube.mail.outbox_size == 0
+    rig.behind += 2.0 * back
+    rig.run(3.0)
+    (told,) = [row for row in rig.ask("alarms")["rig"] if row["code"] == "clock_back"]
+    assert told["count"] == 2
+    assert float(told["detail"].split()[4]) == pytest.approx(2.0 * back, abs=0.6)  # of this step alone
 
 
 @pytest.mark.parametrize("back", BACK)
