@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Final, NamedTuple
 
 from node.kernels.arithmetic.formats import CYCLE_RATE_HZ
@@ -16,7 +16,7 @@ from node.translation.c_lines import break_line
 from node.translation.c_program import CProgram
 from node.translation.c_structs import PREFIX, CStructs
 from node.translation.c_value import c_word
-from node.translation.kernel_source import integer_source
+from node.translation.kernel_source import KernelSource, integer_source
 from node.translation.kinds_of_values import INTEGER, ArrayOf, Kind, RecordOf, declare_variable
 
 HEADER, CODE = "borechain_step.h", "borechain_step.c"
@@ -74,7 +74,7 @@ def write_c_files() -> CFiles:
     constants, structs = program.constants_text(), records.text()
     digest = hashlib.sha256("\0".join((structs, constants, functions)).encode()).hexdigest()[:16]
     header = _header(structs, prototypes, digest)
-    code = _code(constants, functions)
+    code = write_code("One node of a drill string in integers", "the kernels", HEADER, constants, functions)
     return CFiles(header, code, digest, tuple(f"{PREFIX}{name}_{digest}" for name in ENTRIES))
 
 
@@ -83,10 +83,7 @@ def _entry(program: CProgram, name: str) -> tuple[str, str]:
     function, kinds = ENTRIES[name]
     source = integer_source(function)
     made = program.write(source, kinds, source.name)
-    arguments = ", ".join(
-        declare_variable(kind, c_word(argument), program.struct_name)
-        for argument, kind in zip(source.arguments, kinds, strict=True)
-    )
+    arguments = declare_arguments(program, source, kinds)
     prototype = break_line(f"{declare_variable(made.returned, PREFIX + name, program.struct_name)}({arguments})")
     call = f"{made.name}({', '.join(map(c_word, source.arguments))})"
     text = f"""\
@@ -102,7 +99,7 @@ def _entry(program: CProgram, name: str) -> tuple[str, str]:
 
 
 def _header(structs: str, prototypes: list[str], digest: str) -> str:
-    renamed = "\n".join(f"#define {PREFIX}{name} {PREFIX}{name}_{digest}" for name in ENTRIES)
+    renamed = rename_entries(ENTRIES, digest)
     return f"""\
 /* One node of a drill string in integers: its records and what is called. Written by `borechain firmware build`.
  *
@@ -133,10 +130,24 @@ def _header(structs: str, prototypes: list[str], digest: str) -> str:
 """
 
 
-def _code(constants: str, functions: str) -> str:
+def declare_arguments(program: CProgram, source: KernelSource, kinds: Sequence[Kind]) -> str:
+    """Arguments of a prototype, of these kinds."""
+    return ", ".join(
+        declare_variable(kind, c_word(argument), program.struct_name)
+        for argument, kind in zip(source.arguments, kinds, strict=True)
+    )
+
+
+def rename_entries(names: Iterable[str], digest: str) -> str:
+    """Lines by which what is called carries the digest of the source in the name that the linker sees."""
+    return "\n".join(f"#define {PREFIX}{name} {PREFIX}{name}_{digest}" for name in names)
+
+
+def write_code(what: str, source: str, header: str, constants: str, functions: str) -> str:
+    """Text of a file of C: ``what`` it is, in words, and the ``source`` that it is written from."""
     return f"""\
-/* One node of a drill string in integers. Written by `borechain firmware build` from the kernels: do not edit. */
-#include "{HEADER}"
+/* {what}. Written by `borechain firmware build` from {source}: do not edit. */
+#include "{header}"
 
 {helpers_text(functions)}
 {constants}

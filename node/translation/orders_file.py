@@ -6,12 +6,10 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 from node.kernels.record.node_record import EVENTS
-from node.translation.c_file import HEADER, NODES
-from node.translation.c_helpers import helpers_text
+from node.translation.c_file import HEADER, NODES, declare_arguments, rename_entries, write_code
 from node.translation.c_lines import break_line
 from node.translation.c_program import CProgram
 from node.translation.c_structs import PREFIX, CStructs
-from node.translation.c_value import c_word
 from node.translation.chip_orders import next_event, order_alignment, order_record, order_survey
 from node.translation.kernel_source import integer_source
 from node.translation.kinds_of_values import INTEGER, ArrayOf, Kind, declare_variable
@@ -55,7 +53,10 @@ def write_order_files(digest: str) -> OrderFiles:
     program = CProgram(CStructs())
     prototypes = [_entry(program, name) for name in ORDERS]
     functions = "\n".join(program.texts)
-    return OrderFiles(_header(prototypes, digest), _code(program.constants_text(), functions))
+    code = write_code(
+        "Orders to a node in integers", "the firmware's own", ORDERS_HEADER, program.constants_text(), functions
+    )
+    return OrderFiles(_header(prototypes, digest), code)
 
 
 def _entry(program: CProgram, name: str) -> str:
@@ -63,17 +64,14 @@ def _entry(program: CProgram, name: str) -> str:
     function, kinds = ORDERS[name]
     source = integer_source(function)
     made = program.write(source, kinds, PREFIX + name, static="")
-    arguments = ", ".join(
-        declare_variable(kind, c_word(argument), program.struct_name)
-        for argument, kind in zip(source.arguments, kinds, strict=True)
-    )
+    arguments = declare_arguments(program, source, kinds)
     return f"/* {source.summary} */\n" + break_line(
         f"{declare_variable(made.returned, made.name, program.struct_name)}({arguments});"
     )
 
 
 def _header(prototypes: list[str], digest: str) -> str:
-    renamed = "\n".join(f"#define {PREFIX}{name} {PREFIX}{name}_{digest}" for name in ORDERS)
+    renamed = rename_entries(ORDERS, digest)
     return f"""\
 /* Orders to a node in integers, between two steps, and what it has to tell. Written by `borechain firmware build`. */
 #ifndef BORECHAIN_ORDERS_H
@@ -88,14 +86,3 @@ def _header(prototypes: list[str], digest: str) -> str:
 
 #endif
 """
-
-
-def _code(constants: str, functions: str) -> str:
-    return f"""\
-/* Orders to a node in integers. Written by `borechain firmware build` from the firmware's own: do not edit. */
-#include "{ORDERS_HEADER}"
-
-{helpers_text(functions)}
-{constants}
-
-{functions}"""

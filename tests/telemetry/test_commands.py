@@ -104,6 +104,10 @@ def test_what_is_no_tube_is_refused(tube: str) -> None:
         ("recalibrate", "", "begin|attitude|solve|confirm|cancel|surveys, got ''"),
         ("recalibrate", "dance", "got 'dance'"),
         ("align", "begin", "expected no action"),
+        ("nothing", "", "expected cmd/take_survey|static_record|"),
+        ("length", "tell", "cmd/length: expected no action, got 'tell'"),
+        ("north", "", "expected cmd/north?action=tell|check, got ''"),
+        ("alarm", "kill", "expected cmd/alarm?action=acknowledge|shelve|unshelve, got 'kill'"),
     ],
 )
 def test_a_wrong_name_is_told_the_right_ones(name: str, action: str, named: str) -> None:

@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import pytest
-
-from telemetry.application.commands import COMMANDS, CommandSpec, ObeyedBy, find_command
-from telemetry.errors import CommandError
+from telemetry.application.commands import COMMANDS, CommandSpec, ObeyedBy
 
 PI, TURN, FINEST, MOST = math.pi, math.tau, math.radians(1e-4), 2**53
 NUMBER = ("integer", "1", 1, MOST, True, None)
@@ -69,18 +66,3 @@ def test_every_command_asks_for_what_it_says_in_its_range() -> None:
     assert ground == GROUND
     assert {spec.name for spec in COMMANDS if spec.goes_on} == {"static_record"}
     assert len(COMMANDS) == len(TUBE) + len(GROUND)
-
-
-@pytest.mark.parametrize(
-    ("name", "action", "says"),
-    [
-        ("nothing", "", "expected cmd/take_survey|static_record|"),
-        ("length", "tell", "cmd/length: expected no action, got 'tell'"),
-        ("north", "", "expected cmd/north?action=tell|check, got ''"),
-        ("alarm", "kill", "expected cmd/alarm?action=acknowledge|shelve|unshelve, got 'kill'"),
-    ],
-)
-def test_a_command_that_is_none_is_refused_with_those_there_are(name: str, action: str, says: str) -> None:
-    with pytest.raises(CommandError) as refused:
-        find_command(name, action)
-    assert says in str(refused.value)
