@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from needed_programs import needs
+from waiting import until
 
 from node.translation.chip_program import BARE
 from node.translation.toolchains import TOOLCHAINS
@@ -112,15 +113,14 @@ class Tube:
 
     def run_until(self, condition: Callable[[], bool]) -> None:
         """Carry frames until something is so."""
-        deadline = time.monotonic() + PATIENCE
-        while not condition():
-            now = time.monotonic()
-            assert now < deadline, (self.payloads, self.link.counters, self._port.counters)
-            while self._inbox:
-                self.payloads += [bytes(payload) for payload in self.link.receive(self._inbox.pop(0), now)]
-            for frame in self.link.take_frames(now):
-                self._port.send(frame)
-            time.sleep(0.002)
+        until(lambda: self._carry_frames() or condition(), PATIENCE)
+
+    def _carry_frames(self) -> None:
+        now = time.monotonic()
+        while self._inbox:
+            self.payloads += [bytes(payload) for payload in self.link.receive(self._inbox.pop(0), now)]
+        for frame in self.link.take_frames(now):
+            self._port.send(frame)
 
     def messages(self, kind: type) -> list[object]:
         """Messages of a type that came as signals."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import can
 import cantools
 import pytest
+from waiting import until
 
 from sim.can.can_hub import CanHub, running_hub
 from sim.can.wire import CanWire
@@ -41,7 +41,6 @@ from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.runtime.joint_watch import JointWatch
 from telemetry.transport.hop import HopLink
 
-PATIENCE = 30.0
 DBC = Path(__file__).parents[2] / "docs" / "borechain.dbc"
 UPPER, LOWER = TubeEnd("rig", 2, Side.LOWER, 1), TubeEnd("rig", 1, Side.UPPER, 2)
 
@@ -59,15 +58,6 @@ class Ends:
             opened.listen(heard.append)
             self.ports.append(opened)
         self.upper, self.lower = self.ports
-
-
-def until(holds: Callable[[], object]) -> None:
-    """Wait until something holds."""
-    deadline = time.monotonic() + PATIENCE
-    tick = threading.Event()
-    while not holds():
-        assert time.monotonic() < deadline
-        tick.wait(0.005)
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 import tty
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,6 +19,7 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from needed_programs import needs_gcc
+from waiting import PATIENCE, until
 
 from borechain.cli.link.link import link
 from sim.can.can_hub import CanHub, running_hub
@@ -36,7 +37,6 @@ from telemetry.media.serial_line import SerialLine
 from telemetry.media.slcan import SlcanAdapter, SlcanFrame
 from telemetry.messages import Side
 
-PATIENCE = 30.0
 CHIP, TUBE = 2, 1
 
 
@@ -177,13 +177,6 @@ def start_bridge(stack: contextlib.ExitStack, chip: ChipEnd, hub: CanHub, frames
     stack.callback(thread.join)
     stack.callback(bridge.stop)
     return bridge
-
-
-def until(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.002)
 
 
 @needs_gcc
