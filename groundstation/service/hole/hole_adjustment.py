@@ -27,7 +27,7 @@ from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR, SphereDirection, tangent_errors
-from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
+from groundstation.survey.fusion.tangents import tangents_of
 from groundstation.survey.fusion.trust_level import Trust
 
 Array = npt.NDArray[np.float64]
@@ -125,7 +125,7 @@ class HoleAdjustment:
     def path_of(self, mds: Array, collar: Direction) -> PathPrior:
         """What is known of the path before."""
         tangents = tangents_of([collar])
-        cov, _, _ = tangent_errors(collar, tangent_jacobians(tangents)[0])
+        cov, _, _ = tangent_errors(collar, tangents[0])
         return PathPrior(
             np.concatenate([[0.0], mds]),
             tangents[0],

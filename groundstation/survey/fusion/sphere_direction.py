@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import UPRIGHT, Direction
-from groundstation.survey.fusion.tangents import tangent_jacobians
+from groundstation.survey.fusion.tangents import tangent_jacobian
 
 Array = npt.NDArray[np.float64]
 UNKNOWN_YAW_VAR = math.pi**2 / 3.0  # rad^2, uniform on the circle, as nodes say it (``telemetry.messages``)
@@ -84,21 +84,21 @@ def on_sphere(direction: Direction) -> SphereDirection:
     if isinstance(direction, SphereDirection):
         return direction
     tangent = np.array([*direction.lean, direction.down])
-    (jacobian,) = tangent_jacobians(tangent[None])
+    jacobian = tangent_jacobian(tangent)
     return SphereDirection(tangent, jacobian @ direction.cov @ jacobian.T, Packed(direction.shared).under(jacobian))
 
 
-def tangent_errors(direction: Direction, jacobian: Array) -> tuple[Array, Packed, Array]:
+def tangent_errors(direction: Direction, tangent: Array) -> tuple[Array, Packed, Array]:
     """Errors of the unit vector of any direction: own covariance (3, 3), lean columns, and vertical part (c,) of these.
 
-    ``jacobian`` (3, 2) is that of the lean, for directions whose errors lie in its plane.
+    ``tangent`` (3,) is that unit vector, for directions whose errors lie in the plane of the lean.
     """
     if isinstance(direction, SphereDirection):
         columns = direction.packed
         lean = Packed.of_values(columns.values[:2], columns.places, columns.width)
         own = direction.own if direction.bow is SURE else direction.own + direction.bow
         return own, lean, columns.values[2]
-    columns = Packed(direction.shared)
+    columns, jacobian = Packed(direction.shared), tangent_jacobian(tangent)
     return jacobian @ direction.cov @ jacobian.T, columns, (jacobian @ columns.values)[2].copy()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from operator import attrgetter
 
@@ -11,6 +12,7 @@ import numpy.typing as npt
 from groundstation.survey.fusion.resolve import Direction
 
 Array = npt.NDArray[np.float64]
+LEAST_DOWN = 1e-6  # of a level direction, whose lean does not show its errors up and down
 LEAN, DOWN = map(attrgetter, ("lean", "down"))
 
 
@@ -22,10 +24,8 @@ def tangents_of(directions: Sequence[Direction]) -> Array:
     return tangents
 
 
-def tangent_jacobians(tangents: Array) -> Array:
-    """D tangent / d lean (n, 3, 2); the vertical part follows from the unit length."""
-    down = np.copysign(np.maximum(np.abs(tangents[:, 2]), 1e-6), tangents[:, 2])
-    jacobians = np.zeros((len(tangents), 3, 2))
-    jacobians[:, 0, 0] = jacobians[:, 1, 1] = 1.0
-    jacobians[:, 2] = -tangents[:, :2] / down[:, None]
-    return jacobians
+def tangent_jacobian(tangent: Array) -> Array:
+    """D tangent / d lean (3, 2) of a unit vector (3,); the vertical part follows from the unit length."""
+    north, east, vertical = tangent.tolist()
+    down = math.copysign(max(abs(vertical), LEAST_DOWN), vertical)
+    return np.array([[1.0, 0.0], [0.0, 1.0], [-north / down, -east / down]])

@@ -31,7 +31,7 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 LEAST = 0.1  # of |1 - q s*|, below which surveys say nothing of a turn: beyond 85 deg of inclination
 UPWARD = 1e-9  # of 1 + cos I, where a lean has no image
-LEVEL = 1e-6  # of |cos I|, as ``trajectory.tangent_jacobians`` takes it
+LEVEL = 1e-6  # of |cos I|, as ``tangents.tangent_jacobian`` takes it
 STRAIGHT = 1e-9  # rad, of two legs that bend nowhere
 UNKNOWN_BEND = 1.0  # rad, how far the one leg there is may bend out of its arc
 

@@ -59,6 +59,8 @@ class LegWander:
     def moments(self, legs: Array) -> Array:
         """Moments (n, 4) at the ends of legs (n,), m."""
         rounded = legs.round(SAME).tolist()
+        if len(rounded) == 1:
+            return np.array([arc_moment(*rounded, 1.0, self.length)])
         known: dict[float, ArcMoment] = {}
         for leg in rounded:
             if leg not in known:

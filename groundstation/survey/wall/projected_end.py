@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.fusion.resolve import Direction
-from groundstation.survey.fusion.tangents import tangent_jacobians
+from groundstation.survey.fusion.tangents import tangent_jacobian
 from groundstation.survey.path.curvature_tendency import CurvatureTendency
 from groundstation.survey.path.normal_mixture import CONFIDENCE, NOWHERE, NormalMixture
 from groundstation.survey.path.path_ahead import PathAhead
@@ -148,7 +148,7 @@ def project_to_target(
         return ProjectedEnd(here, now, here.cov, is_reached=along >= STEEPEST, comes_there=along >= STEEPEST)
     # an error along the axis changes how far there is to go: what counts is its trace on the target's plane
     onto_plane = end.across @ (np.eye(3) - np.outer(point.tangent, axis) / along)
-    across = tendency.axes @ tangent_jacobians(point.tangent[None])[0]
+    across = tendency.axes @ tangent_jacobian(point.tangent)
     shared = across @ (direction.total_cov - direction.cov) @ across.T
     path = PathAhead(tendency, tendency.axes @ point.cov @ tendency.axes.T, shared)
     way = WayAhead(point.md, rest, offset, point.tangent, onto_plane, path, design)

@@ -30,10 +30,10 @@ def arc_displacements(lengths: Array, upper: Array, lower: Array) -> Array:
     Where the two are opposite no arc is defined: such a leg leads nowhere, as the mean of its tangents does.
     """
     chords = lower - upper
-    bends = 2.0 * np.arcsin(np.minimum(0.5 * np.sqrt((chords * chords).sum(axis=-1)), 1.0))
-    bent = (bends > SMALL) & (bends < math.pi - OPPOSITE)
-    if bent.all():
+    bends = 2.0 * np.arcsin(np.minimum(0.5 * np.sqrt(np.vecdot(chords, chords)), 1.0))
+    if SMALL < bends.min(initial=math.inf) and bends.max(initial=0.0) < math.pi - OPPOSITE:
         return np.asarray((0.5 * lengths * (2.0 / bends * np.tan(0.5 * bends)))[:, None] * (upper + lower))
+    bent = (bends > SMALL) & (bends < math.pi - OPPOSITE)
     safe = np.where(bent, bends, 1.0)
     factors = np.where(bent, 2.0 / safe * np.tan(0.5 * safe), 1.0 + np.where(bends < SMALL, bends * bends / 12.0, 0.0))
     return np.asarray((0.5 * lengths * factors)[:, None] * (upper + lower))

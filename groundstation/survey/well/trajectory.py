@@ -348,12 +348,6 @@ class Trajectory:
             follow_legs,  # reading alone needs no compiler
         )
 
-        lengths, more = rows["md"][1:] - rows["md"][:-1], np.empty((len(legs), 3, 3))
-        alongs, memories = rows["along"].copy(), rows["memory"].copy()
-        kinks, path = rows["kinks"].copy(), rows["path"].copy()
-        follow_legs(
-            legs, lengths, rows["depth_var"].copy(), self._moments(begin, lengths), self._wander.std, alongs, memories,
-            kinks, path, more,
-        )  # fmt: skip
-        rows["along"], rows["memory"], rows["kinks"], rows["path"] = alongs, memories, kinks, path
+        more = np.empty((len(legs), 3, 3))
+        follow_legs(rows, legs, self._moments(begin, rows["md"][1:] - rows["md"][:-1]), self._wander.std, more)
         return more

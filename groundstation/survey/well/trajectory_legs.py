@@ -46,7 +46,7 @@ def check_bends(method: Method, mds: Sequence[float], tangents: Array) -> None:
         With the depths of the first leg that turns back on itself.
     """
     upper, lower = tangents[:-1], tangents[1:]
-    if method is not Method.MINIMUM_CURVATURE or (upper * lower).sum(axis=-1).min(initial=1.0) > BACKWARDS:
+    if method is not Method.MINIMUM_CURVATURE or np.vecdot(upper, lower).min(initial=1.0) > BACKWARDS:
         return
     for leg in np.flatnonzero(bend_angles(upper, lower) > math.pi - OPPOSITE).tolist():
         above, below = mds[leg], mds[leg + 1]

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.sphere_direction import tangent_errors
-from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
+from groundstation.survey.fusion.tangents import tangents_of
 from groundstation.survey.well.depth_errors import EXACT, StationDepth
 from groundstation.survey.well.trajectory_rows import FEWEST, GROWTH, ROW, Followed, TrajectorySums, runs_of
 
@@ -26,7 +26,7 @@ PLACES, VALUES = map(attrgetter, ("places", "values"))
 DEPTH_PLACES, DEPTH_VALUES = map(attrgetter, ("columns.places", "columns.values"))
 NONE: Final = Packed(np.zeros((2, 0)))
 NOTHING: Final = np.zeros(0)
-FROM_ZERO: Final = np.zeros(1, np.intp)
+NO_PLACES: Final = np.zeros(0, np.intp)
 
 
 class TrajectoryStations:
@@ -87,19 +87,18 @@ class TrajectoryStations:
         directions = [*map(self.directions.__getitem__, places)]
         if tangents is None:
             tangents = tangents_of(directions)
-        jacobians = tangent_jacobians(tangents)
-        counts, own_vars = [], []
         rows = self.rows
         at = slice(places.start, places.stop) if isinstance(places, range) else np.array(places)
-        for place, direction, jacobian in zip(places, directions, jacobians, strict=True):
-            own, columns, self._down[place] = tangent_errors(direction, jacobian)
-            rows["own"][place], self._columns[place], depth = own, columns, self.depths[place]
-            width = max(columns.width, depth.columns.width)
-            counts.append((width, len(columns.places), len(depth.columns.places)))
-            own_vars.append(depth.own_var)
         rows["tangent"][at] = tangents
-        rows["width"][at], rows["count"][at], rows["depths"][at] = zip(*counts, strict=True)
-        rows["depth_var"][at] = own_vars
+        owns, widths, counts, of_depths, own_vars = (
+            rows[name] for name in ("own", "width", "count", "depths", "depth_var")
+        )
+        for place, direction, tangent in zip(places, directions, tangents, strict=True):
+            owns[place], columns, self._down[place] = tangent_errors(direction, tangent)
+            self._columns[place], by_depth = columns, self.depths[place].columns
+            widths[place] = max(columns.width, by_depth.width)
+            counts[place], of_depths[place] = len(columns.places), len(by_depth.places)
+            own_vars[place] = self.depths[place].own_var
 
     def shared_depth_vars(self) -> Array:
         """Variances (n, 3) of the positions by what their depths share, m^2; as of ``follow``, of those alone."""
@@ -126,45 +125,34 @@ class TrajectoryStations:
         )
 
         rows, columns = self.rows[begin : end + 1], self._columns[begin : end + 1]
-        depths = self.depths[begin : end + 1]
-        known = max(sums.passed.shape[1], int(rows["width"][0]))
-        widths = np.maximum(np.maximum.accumulate(rows["width"][1:]), known)
-        starts = np.concatenate([FROM_ZERO, rows["count"].cumsum()])
+        depths, count, known = self.depths[begin : end + 1], end - begin, sums.passed.shape[1]
+        widths = np.maximum(np.maximum.accumulate(rows["width"])[1:], known)
         places = np.concatenate([*map(PLACES, columns)]).astype(np.intp, copy=False)
-        lean, down = (
-            np.concatenate([*map(VALUES, columns)], axis=1),
-            np.concatenate(self._down[begin : end + 1]),
-        )
-        depth_starts = np.concatenate([FROM_ZERO, rows["depths"].cumsum()])
-        depth_places, by_depth = FROM_ZERO[:0], NOTHING
-        if depth_starts[-1]:
+        lean = np.concatenate([*map(VALUES, columns)], axis=1)
+        down = np.concatenate(self._down[begin : end + 1])
+        depth_places, by_depth = NO_PLACES, NOTHING
+        if rows["depths"].any():
             depth_places = np.concatenate([*map(DEPTH_PLACES, depths)]).astype(np.intp, copy=False)
             by_depth = np.concatenate([*map(DEPTH_VALUES, depths)], axis=1)[0]
-        alongs = rows["along"][1:].copy()
-        legs = rows["md"][1:] - rows["md"][:-1]
-        ends = 0.5 * legs
-        weights = ends.copy()  # of the station before each, which has both its legs now
-        weights[0] += 0.5 * sums.length
-        weights[1:] += ends[:-1]
-        width, count = int(widths[-1]), len(ends)
-        marked = np.arange(BLOCK - begin % BLOCK, count + 1, BLOCK) - 1
+        width, first = int(widths[-1]), BLOCK - begin % BLOCK - 1
+        marked = range(first, count, BLOCK)
         marks, own_marks = np.empty((len(marked), 3, width)), np.empty((len(marked), 3, 3))
         passed, own = np.zeros((3, width)), sums.own.copy()
-        passed[:, : sums.passed.shape[1]] = sums.passed
+        passed[:, :known] = sums.passed
         shared, covs = np.empty((count if with_columns else 0, 3, width)), np.empty((count, 3, 3))
         add_stations(
-            weights, ends, starts, places, lean, down, rows["own"].copy(), rows["along"][:-1] - alongs, alongs,
-            depth_starts, depth_places, by_depth, widths, passed, np.empty_like(passed), own,
-            int(marked[0]) if len(marked) else count, BLOCK, marks, own_marks, shared, covs,
+            rows, sums.length, known, places, lean, down, depth_places, by_depth, passed, np.empty_like(passed), own,
+            first if marked else count, BLOCK, marks, own_marks, shared, covs,
         )  # fmt: skip
+        md = rows["md"]
         return Followed(
-            TrajectorySums(own, passed, float(legs[-1])),
+            TrajectorySums(own, passed, float(md[-1] - md[-2])),
             [
-                TrajectorySums(own_marks[number].copy(), marks[number, :, : int(widths[k])].copy(), float(legs[k]))
-                for number, k in enumerate(marked.tolist())
-            ]
-            if len(marked)
-            else [],
+                TrajectorySums(
+                    own_marks[number].copy(), marks[number, :, : int(widths[k])].copy(), float(md[k + 1] - md[k])
+                )
+                for number, k in enumerate(marked)
+            ],
             runs_of(shared, widths) if with_columns else [],
             covs,
         )

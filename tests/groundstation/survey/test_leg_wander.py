@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from groundstation.survey.path.leg_wander import LegWander
 from groundstation.survey.well.kernels.position_errors import follow_legs
+from groundstation.survey.well.trajectory_rows import ROW
 
 PLACES = 1201
 
@@ -16,12 +17,10 @@ PLACES = 1201
 def gathered_by(wander: LegWander, legs: list[float]) -> np.ndarray:
     """Variance that each leg adds (m^2)."""
     count, lengths = len(legs), np.array(legs)
-    down = np.column_stack([0.0 * lengths, 0.0 * lengths, lengths])
-    path = np.zeros((count + 1, 3, 3))
-    follow_legs(
-        down, lengths, np.zeros(count + 1), wander.moments(lengths), wander.std, np.zeros((count + 1, 3)),
-        np.zeros(count + 1), np.zeros((count + 1, 3, 3)), path, np.empty((count, 3, 3)),
-    )  # fmt: skip
+    rows, down = np.zeros(count + 1, ROW), np.column_stack([0.0 * lengths, 0.0 * lengths, lengths])
+    rows["md"][1:] = np.cumsum(lengths)
+    follow_legs(rows, down, wander.moments(lengths), wander.std, np.empty((count, 3, 3)))
+    path = rows["path"]
     assert not path[:, 2, 2].any()
     return np.diff(path[:, 0, 0])
 
