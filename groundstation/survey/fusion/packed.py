@@ -26,7 +26,7 @@ class Packed:
 
     def __init__(self, columns: Array, places: Places | None = None) -> None:
         """``places`` of those that are not zero, where they are known."""
-        at = columns.any(axis=0).nonzero()[0] if places is None else places
+        at = np.nonzero(columns.any(axis=0))[0] if places is None else places
         self.places: npt.NDArray[Any] = at.astype(np.uint16 if columns.shape[1] <= MOST_OF_16_BITS else np.intp)
         self.values: Array = columns.take(at, axis=1)
         self.width = int(columns.shape[1])
