@@ -327,7 +327,6 @@ class Trajectory:
         end = len(self._stations.directions)
         rows = self._stations.rows[begin:end]
         legs = leg_displacements(self.method, rows["md"], rows["tangent"])
-        rows["position"] = np.add.accumulate(np.concatenate([rows["position"][:1], legs]))
         more = self._go_along(begin, rows, legs)
         followed = self._stations.follow(self._sums, begin, end - 1, with_columns=self._keeps_columns)
         rows["cov"][1:] = followed.covs + more
@@ -343,7 +342,7 @@ class Trajectory:
             self._kept += [UNKNOWN] * (len(rows) - 1)
 
     def _go_along(self, begin: int, rows: npt.NDArray[np.void], legs: Array) -> Array:
-        """Compute what depths and the path between stations come to, from rows at a place on: (n, 3, 3), m^2."""
+        """Compute positions, and what depths and the path between stations come to (n, 3, 3), m^2, from a place on."""
         from groundstation.survey.well.kernels.position_errors import (
             follow_legs,  # reading alone needs no compiler
         )

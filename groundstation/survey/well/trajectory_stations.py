@@ -43,6 +43,7 @@ class TrajectoryStations:
         self.directions: list[Direction] = []
         self.depths: list[StationDepth] = []
         self._columns: list[Packed] = []  # (2, s), of each direction
+        self._depths_share = False  # whether any depth ever had columns
         self._down: list[Array] = []  # and what those come to in the vertical, (c,) of those that are kept
 
     def __len__(self) -> int:
@@ -99,6 +100,7 @@ class TrajectoryStations:
             widths[place] = max(columns.width, by_depth.width)
             counts[place], of_depths[place] = len(columns.places), len(by_depth.places)
             own_vars[place] = self.depths[place].own_var
+            self._depths_share |= bool(by_depth.width)
 
     def shared_depth_vars(self) -> Array:
         """Variances (n, 3) of the positions by what their depths share, m^2; as of ``follow``, of those alone."""
@@ -131,7 +133,7 @@ class TrajectoryStations:
         lean = np.concatenate([*map(VALUES, columns)], axis=1)
         down = np.concatenate(self._down[begin : end + 1])
         depth_places, by_depth = NO_PLACES, NOTHING
-        if rows["depths"].any():
+        if self._depths_share:
             depth_places = np.concatenate([*map(DEPTH_PLACES, depths)]).astype(np.intp, copy=False)
             by_depth = np.concatenate([*map(DEPTH_VALUES, depths)], axis=1)[0]
         width, first = int(widths[-1]), BLOCK - begin % BLOCK - 1

@@ -98,14 +98,14 @@ def add_stations(
 
 @kernel
 def follow_legs(rows: Rows, legs: Array, moments: Array, std: float, more: Array) -> None:
-    """Go on down a hole with what its depths err by themselves, and what its path does between stations.
+    """Go on down a hole with its positions, what its depths err by themselves, and what its path does between stations.
 
     See ``groundstation.survey.path.leg_wander``.
 
     Parameters
     ----------
-    rows : (n + 1,) of ``trajectory_rows.ROW``, the station before, known, and those below, of which ``along``,
-        ``memory``, ``kinks`` and ``path`` are set
+    rows : (n + 1,) of ``trajectory_rows.ROW``, the station before, known, and those below, of which ``position``,
+        ``along``, ``memory``, ``kinks`` and ``path`` are set
     legs : (n, 3) m, displacements
     moments : (n, 4), of every leg: v, b, a and what is kept of a curvature
     std : rad/m, of the curvature
@@ -115,6 +115,7 @@ def follow_legs(rows: Rows, legs: Array, moments: Array, std: float, more: Array
         upper, lower = rows[k], rows[k + 1]
         length, size = lower["md"] - upper["md"], 0.0
         for i in range(3):
+            lower["position"][i] = upper["position"][i] + legs[k, i]
             lower["along"][i] = legs[k, i] / length
             size += lower["along"][i] * lower["along"][i]
         grown = std * std * max(moments[k, 0] + 2.0 * moments[k, 1] * upper["memory"], 0.0)
