@@ -31,7 +31,7 @@ def arc_displacements(lengths: Array, upper: Array, lower: Array) -> Array:
     """
     chords = lower - upper
     bends = 2.0 * np.arcsin(np.minimum(0.5 * np.sqrt(np.vecdot(chords, chords)), 1.0))
-    if SMALL < bends.min(initial=math.inf) and bends.max(initial=0.0) < math.pi - OPPOSITE:
+    if bends.min(initial=math.inf) > SMALL and bends.max(initial=0.0) < math.pi - OPPOSITE:
         return np.asarray((0.5 * lengths * (2.0 / bends * np.tan(0.5 * bends)))[:, None] * (upper + lower))
     bent = (bends > SMALL) & (bends < math.pi - OPPOSITE)
     safe = np.where(bent, bends, 1.0)
