@@ -130,7 +130,9 @@ def test_a_disturbance_is_of_the_table_and_of_a_tube_that_is_there() -> None:
     asked("force-step", tube=3)
     with pytest.raises(ScenarioError, match="disturbance.force-step.tube: expected one of 3 tubes, got 4"):
         asked("force-step", tube=4)
-    with pytest.raises(ScenarioError, match="disturbance.earthquake: no such disturbance has a table; expected one of "):
+    with pytest.raises(
+        ScenarioError, match="disturbance.earthquake: no such disturbance has a table; expected one of "
+    ):
         asked("earthquake")
     with pytest.raises(ScenarioError, match="disturbance.force-step: .*colour"):
         asked("force-step", colour=1)
