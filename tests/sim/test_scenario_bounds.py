@@ -28,11 +28,23 @@ def scenario(changes: dict[str, dict[str, Any]]) -> Any:
 @pytest.mark.parametrize(
     ("within", "beyond", "words"),
     [
-        ({"rotation": {"rate_dps": 342.0}}, {"rotation": {"rate_dps": 342.01}}, "rotation.rate_dps: expected at most 342"),
-        ({"rig": {"tubes_at_start": 3}, "schedule": {"blocks": 1}}, {"rig": {"tubes_at_start": 4}}, "at most tubes = 3, got 4"),
+        (
+            {"rotation": {"rate_dps": 342.0}},
+            {"rotation": {"rate_dps": 342.01}},
+            "rotation.rate_dps: expected at most 342",
+        ),
+        (
+            {"rig": {"tubes_at_start": 3}, "schedule": {"blocks": 1}},
+            {"rig": {"tubes_at_start": 4}},
+            "at most tubes = 3, got 4",
+        ),
         ({"rig": {"depth_at_start_m": 4.0}}, {"rig": {"depth_at_start_m": 4.001}}, "at most the 4 m that the tubes"),
         ({"schedule": {"blocks": 2}}, {"schedule": {"blocks": 1}}, "schedule.blocks: expected at least one for each"),
-        ({"schedule": {"joint_s": 59.99}}, {"schedule": {"joint_s": 60.0}}, "schedule.joint_s: expected less than add_s = 60"),
+        (
+            {"schedule": {"joint_s": 59.99}},
+            {"schedule": {"joint_s": 60.0}},
+            "schedule.joint_s: expected less than add_s = 60",
+        ),
         ({"medium": {"latency_ms": 0.5}}, {"medium": {"latency_ms": 0.49}}, "medium.latency_ms: expected at least 0.5"),
         (
             {"torsion": {"release_after_s": 2.0, "release_s": 3.0}},
@@ -61,13 +73,30 @@ def scenario(changes: dict[str, dict[str, Any]]) -> Any:
         ),
         (
             {"rough": {"samples_hz": 400.0, "vibration": {"turning_g": 0.0, "lowest_hz": 20.0, "highest_hz": 210.0}}},
-            {"rough": {"samples_hz": 400.0, "vibration": {"torsional_dps": 0.1, "lowest_hz": 20.0, "highest_hz": 210.0}}},
+            {
+                "rough": {
+                    "samples_hz": 400.0,
+                    "vibration": {"torsional_dps": 0.1, "lowest_hz": 20.0, "highest_hz": 210.0},
+                }
+            },
             "rough.vibration: expected lowest_hz below highest_hz",
         ),
-        ({"rough": {}}, {"rough": {}, "joints": {"head_turn_deg": 1.0}}, "joints.head_turn_deg: expected no such setting"),
-        ({"rough": {}}, {"rough": {}, "encoder": {"edge_times": False}, "medium": {"link": "off"}}, "encoder.edge_times"),
+        (
+            {"rough": {}},
+            {"rough": {}, "joints": {"head_turn_deg": 1.0}},
+            "joints.head_turn_deg: expected no such setting",
+        ),
+        (
+            {"rough": {}},
+            {"rough": {}, "encoder": {"edge_times": False}, "medium": {"link": "off"}},
+            "encoder.edge_times",
+        ),
         ({"rough": {}}, {"rough": {}, "gyroscope": {"instantaneous": True}}, "gyroscope.instantaneous"),
-        ({"node": {"imus": 2, "imu_noise": [1, 2]}}, {"node": {"imus": 2, "imu_noise": [1]}}, "node.imu_noise: expected 2"),
+        (
+            {"node": {"imus": 2, "imu_noise": [1, 2]}},
+            {"node": {"imus": 2, "imu_noise": [1]}},
+            "node.imu_noise: expected 2",
+        ),
         ({"node": {"imus": 2, "imu_noise": []}}, {"node": {"imus": 1, "imu_noise": [1, 1]}}, "expected 1 factors"),
         (
             {"calibration": {"attitudes_deg": ROUND, "record_s": 22.0, "hold_s": 30.0}},
@@ -85,7 +114,11 @@ def scenario(changes: dict[str, dict[str, Any]]) -> Any:
             {"told": {"lengths_off_m": [0.1, 0.0, 0.0, 0.0]}},
             "told.lengths_off_m: expected at most 3",
         ),
-        ({"told": {"depth_stuck_s": 5.0, "depth_stuck_after_s": 0.0}}, {"told": {"depth_stuck_s": 5.0}}, "depth_stuck_after_s with it"),
+        (
+            {"told": {"depth_stuck_s": 5.0, "depth_stuck_after_s": 0.0}},
+            {"told": {"depth_stuck_s": 5.0}},
+            "depth_stuck_after_s with it",
+        ),
         (
             {"path": {"moved": {"after_s": 90.0, "from_m": 1.0, "to_m": 7.0}}},
             {"path": {"moved": {"after_s": 90.0, "from_m": 1.0, "to_m": 7.001}}},
@@ -97,7 +130,7 @@ def scenario(changes: dict[str, dict[str, Any]]) -> Any:
             "path.moved.to_m: expected more than from_m = 1",
         ),
     ],
-)  # fmt: skip
+)
 def test_a_limit_is_kept_at_its_value_and_refused_beyond(
     within: dict[str, Any], beyond: dict[str, Any], words: str
 ) -> None:
@@ -128,16 +161,16 @@ def test_a_disturbance_is_of_the_table_and_of_a_tube_that_is_there() -> None:
         scenario({"disturbance": {name: table}})
 
     asked("force-step", tube=3)
-    with pytest.raises(ScenarioError, match="disturbance.force-step.tube: expected one of 3 tubes, got 4"):
+    with pytest.raises(ScenarioError, match=r"disturbance.force-step.tube: expected one of 3 tubes, got 4"):
         asked("force-step", tube=4)
     with pytest.raises(
-        ScenarioError, match="disturbance.earthquake: no such disturbance has a table; expected one of "
+        ScenarioError, match=r"disturbance.earthquake: no such disturbance has a table; expected one of "
     ):
         asked("earthquake")
-    with pytest.raises(ScenarioError, match="disturbance.force-step: .*colour"):
+    with pytest.raises(ScenarioError, match=r"disturbance.force-step: .*colour"):
         asked("force-step", colour=1)
     asked("calibration-exchanged", tubes=[1, 3])
     with pytest.raises(ScenarioError, match="expected two tubes, got 3 twice"):
         asked("calibration-exchanged", tubes=[3, 3])
-    with pytest.raises(ScenarioError, match="disturbance.calibration-exchanged.tubes: expected one of 3 tubes, got 4"):
+    with pytest.raises(ScenarioError, match=r"disturbance.calibration-exchanged.tubes: expected one of 3 tubes, got 4"):
         asked("calibration-exchanged", tubes=[1, 4])
