@@ -1,4 +1,4 @@
-"""Every step of a fault is done to a rig that only notes it: what is begun is ended, and both are what the name says."""
+"""Every step of a fault is done to a rig that only notes it: what is begun is ended, and is what the name says."""
 
 from __future__ import annotations
 
@@ -233,7 +233,9 @@ def test_frames_are_disturbed_for_a_while_and_then_no_more(kind: str) -> None:
     assert vars(rig.channel) == before
 
 
-@pytest.mark.parametrize(("kind", "name", "low", "high"), [("asymmetric", "port_loss", 0.6, 0.98), ("slow", "port_delay", 0.1, 1.5)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("kind", "name", "low", "high"), [("asymmetric", "port_loss", 0.6, 0.98), ("slow", "port_delay", 0.1, 1.5)]
+)
 def test_ports_are_bad_for_a_while(kind: str, name: str, low: float, high: float) -> None:
     met: set[Any] = set()
     for seed in range(40):

@@ -53,9 +53,18 @@ def settings(*words: str) -> TubeSettings:
 def test_what_is_not_told_is_as_usual() -> None:
     degree = math.pi / 180.0
     assert settings() == TubeSettings(
-        tube=3, drive_joint=UNTOLD, lower_joint=UNTOLD, mount_std=0.05 * degree, kernel="float64",
-        scheme=Scheme.FORWARD, stiffness=math.inf, torsion="gate", joints="marks", imus=(ImuSettings(),), gyro_noise=None,
-    )  # fmt: skip
+        tube=3,
+        drive_joint=UNTOLD,
+        lower_joint=UNTOLD,
+        mount_std=0.05 * degree,
+        kernel="float64",
+        scheme=Scheme.FORWARD,
+        stiffness=math.inf,
+        torsion="gate",
+        joints="marks",
+        imus=(ImuSettings(),),
+        gyro_noise=None,
+    )
     assert SEEN["ends"] == EndsRequest("stepper", None, None, None, None)
 
 

@@ -197,7 +197,8 @@ def test_errors_and_curves_of_a_triad_are_drawn_where_they_are(axes: str, small:
 
 FACES = np.radians(np.array([0.0, 90.0, 200.0]))
 QUALITY = QualityReport(
-    FACES, np.radians(np.array([10.0, 10.2, 10.6])), np.radians(np.array([359.0, 0.0, 3.0])), np.array([1.0, 1.001, 1.004]),
+    FACES, np.radians(np.array([10.0, 10.2, 10.6])), np.radians(np.array([359.0, 0.0, 3.0])),
+    np.array([1.0, 1.001, 1.004]),
     (
         QualityVerdict("inclination", "rad", math.radians(0.6), math.radians(0.5)),
         QualityVerdict("azimuth", "rad", math.radians(4.0), math.radians(8.0)),
