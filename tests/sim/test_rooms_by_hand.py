@@ -21,6 +21,7 @@ from sim.rig.rig_progress import give_up
 from sim.rig.site_files import hole_rows, write_stations, write_wall
 from sim.world.disturbance.frame_layout import FINER, SUMS
 from sim.world.disturbance.frame_sums import frame_sums, rows_of
+from sim.world.disturbance.frame_vibration import Vibration, folded_amplitude
 from sim.world.disturbance.one_tube import is_later
 from sim.world.disturbance.row import ImuSamples, OneImu
 from sim.world.disturbance.whirl import whirl_around
@@ -290,3 +291,39 @@ def test_figures_of_a_realtime_run_take_the_worst_and_the_sum() -> None:
     for row in rows:
         row |= {"private_mb": row["hop"], "pss_mb": 10 * row["hop"]}
     assert total_figures(rows) == {"cycles": 22, "overruns": 3, "cpu_percent": 4.0, "private_mb": 3, "pss_mb": 30}
+
+
+@pytest.mark.parametrize("is_angle", [False, True])
+@pytest.mark.parametrize(
+    ("lowest", "highest", "frames_hz"), [(20.0, 300.0, 200.0), (60.0, 90.0, 400.0), (5.0, 480.0, 97.0)]
+)
+def test_vibration_of_the_frames_has_the_power_of_the_filtered_band(
+    lowest: float, highest: float, frames_hz: float, is_angle: bool
+) -> None:
+    """Folding keeps power: 2/N of all squares is the mean over the band of what the filter and the grid let pass.
+
+    A Butterworth of two poles by the bilinear transform has 1 / (1 + (tan(w/2) / tan(wc/2))^4); linear between two
+    samples at any place has (2 + cos w) / 3, the mean of two steps cos^2 (w/2).
+    """
+    hertz, low_pass, count = 1000.0, 42.0, 1 << 13
+    file = scenario_of(
+        {
+            "rig": {"tubes": 2, "tube_length_m": 2.0},
+            "path": {"straight": {"inclination_deg": 3.0, "azimuth_deg": 0.0}},
+            "rough": {
+                "samples_hz": hertz,
+                "sensor": {"frames_hz": frames_hz, "low_pass_hz": low_pass},
+                "vibration": {"turning_g": 0.5, "torsional_dps": 3.0, "lowest_hz": lowest, "highest_hz": highest},
+            },
+        }
+    ).file
+    assert file.rough is not None
+    shape = folded_amplitude(file.rough, 1.0 / frames_hz, count, is_angle=is_angle)
+    w = math.tau * np.linspace(lowest, highest, 200_001) / hertz
+    passed = 1.0 / (1.0 + (np.tan(0.5 * w) / math.tan(math.pi * low_pass / hertz)) ** 4) * (2.0 + np.cos(w)) / 3.0
+    wanted = float(np.mean(passed * (np.cos(0.5 * w) ** 2 if is_angle else 1.0)))
+    assert 2.0 / count * float(np.sum(shape**2)) == pytest.approx(wanted, rel=0.01)
+    rates, forces = Vibration(file.rough, 1.0 / frames_hz, count).drawn(np.random.default_rng(3))
+    drawn = np.diff(rates if is_angle else forces)
+    source = math.radians(3.0) if is_angle else 0.5 * 9.80665
+    assert drawn.std() == pytest.approx(source * math.sqrt(wanted), rel=0.08)
