@@ -229,7 +229,7 @@ class SeenRig:
             note()
 
 
-def test_an_encoder_that_never_went_wrong_was_seen_and_one_that_slipped_before_nobody_was_not() -> None:
+def test_an_encoder_that_never_went_wrong_was_seen_and_one_that_slipped_unwatched_was_not() -> None:
     rig: Any = SeenRig()
     sight = FaultObservability(rig)
     rig.at(110.0)
@@ -249,7 +249,7 @@ def test_a_depth_is_believed_wrong_where_the_database_came_from_outside_meanwhil
         rig.at(110.0)
         rig.handled, rig.world.depth_error = handled, error
         rig.at(120.0)
-        assert not sight.has_believed_a_wrong_depth  # nobody is there yet
+        assert not sight.has_believed_a_wrong_depth  # there is no ground station yet
         rig.ground = object()
         rig.at(130.0)
         assert sight.has_believed_a_wrong_depth is believed
@@ -258,7 +258,7 @@ def test_a_depth_is_believed_wrong_where_the_database_came_from_outside_meanwhil
         assert sight.has_believed_a_wrong_depth is believed  # what was handled is handled once
 
 
-def test_a_string_that_was_turned_in_the_dark_is_known_to_nobody() -> None:
+def test_of_a_string_that_was_turned_in_the_dark_nothing_is_known() -> None:
     for off, known in (({ENCODER: 0.0, 1: 0.0, 2: 0.0}, False), ({ENCODER: 0.0, 1: 0.0}, True)):
         rig: Any = SeenRig()
         sight = FaultObservability(rig)

@@ -27,7 +27,7 @@ class NotedPublisher:
         self.put, self._is_heard, self.is_closed = put, is_heard, False
 
     def watch(self) -> None:
-        """Know at any time whether somebody hears."""
+        """Know at any time whether the key has a subscriber."""
 
     @property
     def is_heard(self) -> bool:

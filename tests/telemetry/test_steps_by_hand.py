@@ -116,7 +116,7 @@ def test_a_stream_ends_where_the_peer_goes_and_where_it_announces_too_much(
     assert stream.receive() is None
     theirs.close()
     assert stream.arrived() is None
-    stream.send(b"to nobody")
+    stream.send(b"to an end that is gone")
 
 
 def test_a_listener_knows_its_streams_by_name_and_tells_which_ended(tmp_path: Path) -> None:
