@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,8 +15,10 @@ from telemetry.keys import is_order, port_key
 from telemetry.media.can_medium import CanSettings
 from telemetry.media.neighbours import stepped_ports, stepped_ports_on
 from telemetry.media.port import MAX_FRAME, STEPPER, PortFrame, TubeEnd
+from telemetry.media.zenoh_bus import ZenohBus
 from telemetry.media.zenoh_port import ZenohMedium, ZenohPort
-from telemetry.messages import BASE, ENCODER, Side
+from telemetry.messages import BASE, ENCODER, HOPS_UNKNOWN, MAX_TUBE, NodeMode, NodeState, Side
+from telemetry.presentation.msgpack_codec import encode_message, state_origin
 from telemetry.schema import SCHEMA
 from telemetry.unwritten import Unwritten
 
@@ -202,3 +205,38 @@ def test_a_message_is_as_new_as_its_newest_field() -> None:
     assert {BASE, ENCODER}.isdisjoint({STEPPER})
     ranges = {(f.low, f.high) for spec in SCHEMA for f in spec.fields if f.kind.name == "COVARIANCE"}
     assert ranges == {(-1e6, 1e6)}
+
+
+@pytest.mark.parametrize("tube", [1, 127, 128, 250])
+def test_a_state_cut_off_anywhere_is_known_or_none(tube: int) -> None:
+    """The tube is one byte up to 127 and two beyond; what ends before it has no tube, and raises nothing."""
+    state = NodeState(
+        tube, 1000.0, 2, NodeMode.TRACKING, 1.0, 1e-6, 1e-6, (0.01, 0.0, -0.01), 1e-3, 0.01, 1e-5, 2.0, 1e-8, 0, 5, 0
+    )  # type: ignore[arg-type]
+    payload = encode_message(state)
+    found = [state_origin(payload[:size]) for size in range(len(payload) + 1)]
+    assert found[-1] == tube
+    first = found.index(tube)
+    assert found[:first] == [None] * first
+    assert set(found[first:]) == {tube}
+    assert payload[first - 1] == tube or payload[first - 2] == tube
+
+
+def test_hops_that_are_not_known_are_no_number_of_hops() -> None:
+    assert HOPS_UNKNOWN not in range(MAX_TUBE + 1)
+    saved = next(spec for spec in SCHEMA if any(field.name == "hops" for field in spec.fields))
+    field = next(field for field in saved.fields if field.name == "hops")
+    assert field.low <= HOPS_UNKNOWN < 0.0
+
+
+def test_tokens_of_a_session_are_keys_and_an_error_is_none() -> None:
+    replies = [SimpleNamespace(ok=SimpleNamespace(key_expr=key)) for key in ("b", "a", "b")]
+    asked: list[Any] = []
+
+    def get(pattern: str, timeout: float) -> list[Any]:
+        asked.append((pattern, timeout))
+        return [*replies, SimpleNamespace(ok=None, err="late")]
+
+    session: Any = SimpleNamespace(liveliness=lambda: SimpleNamespace(get=get))
+    assert ZenohBus(session).tokens("r/*", 0.5) == ["a", "b", "b"]
+    assert asked == [("r/*", 0.5)]
