@@ -62,6 +62,7 @@ def test_a_rig_has_a_process_a_tube_and_three_more(tmp_path: Path, has_keys: boo
         "tube-2",
         "tube-3",
     }
+    named = {"medium": BASE, "base": BASE, "encoder": ENCODER}
     for name, place in places.items():
         assert (place.rig, place.endpoint, place.steps, place.keys) == ("r", "tcp/127.0.0.1:9", steps, keys)
         assert place.key_file == (None if has_keys else tmp_path / "rig.key")
