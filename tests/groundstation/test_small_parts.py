@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+import datetime
 import math
 from types import SimpleNamespace
 from typing import Any
 
+import msgpack
 import numpy as np
 import pytest
 
 from groundstation.calibration.attitudes import AttitudeFit
 from groundstation.calibration.mwd_model import Triad
-from groundstation.errors import SelectorError
+from groundstation.errors import SelectorError, SurveyError
+from groundstation.gateway.page import exports
 from groundstation.gateway.page.openapi import arguments_of, openapi_document
+from groundstation.gateway.zenoh import ZenohGateway
 from groundstation.report.calibrations.linear_outcome import LinearCalibration, linear_outcome
 from groundstation.service.answers.paths import check_parameters
 from groundstation.service.hole.resolved_stops import FEWEST, ROW, ResolvedStops
+from groundstation.service.process.intake_tape import Tape, unpack_intake
 from groundstation.survey.requests.survey_answer import magnetic_needs
 from groundstation.survey.requests.wall_result import wall_site
 from groundstation.survey.well.gyro_export import needs_record
 from telemetry.application.arguments import shown_name
 from telemetry.application.commands import COMMANDS
+from telemetry.media.zenoh_bus import MSGPACK
 from telemetry.quantities import ValueKind
 
 
@@ -168,3 +174,64 @@ def test_what_was_found_of_a_rig_is_a_fact_of_its_sheet() -> None:
     assert (outcome.result["temperature_c"], outcome.result["widened"], outcome.result["forced"]) == (
         21.5, 1.25, ["gate one", "gate two"],
     )  # fmt: skip
+
+
+class AskedIntake:
+    """A question of a recorder, and what it is answered."""
+
+    def __init__(self, **parameters: str) -> None:
+        self.parameters, self.selector_key = parameters, "key"
+        self.replies: list[list[int]] = []
+        self.refusals: list[str] = []
+        self.is_finished = False
+
+    def reply(self, key: str, payload: bytes, encoding: str) -> None:
+        assert (key, encoding) == ("key", MSGPACK)
+        self.replies.append([unpack_intake(one).number for one in msgpack.unpackb(payload)])
+
+    def reply_error(self, text: str) -> None:
+        self.refusals.append(text)
+
+    def finish(self) -> None:
+        self.is_finished = True
+
+
+@pytest.mark.parametrize(
+    ("since", "numbers"),
+    [
+        (None, range(1, 501)), ("0", range(1, 501)), ("3", range(4, 504)), ("599", range(600, 701)), ("699", [700]),
+        ("700", []), ("701", []), ("99999", []),
+    ],
+)  # fmt: skip
+def test_a_recorder_gets_what_came_after_its_newest_so_many_at_a_time(since: str | None, numbers: Any) -> None:
+    tape = Tape()
+    for k in range(700):
+        tape.add("depth", float(k), float(k), 1, b"x")
+    gateway: Any = SimpleNamespace(_process=SimpleNamespace(tape=tape))
+    query: Any = AskedIntake(**({} if since is None else {"since": since}))
+    ZenohGateway._answer_intake(gateway, query)
+    assert query.replies == [list(numbers)]
+    assert query.is_finished
+    wrong: Any = AskedIntake(since="-1")
+    ZenohGateway._answer_intake(gateway, wrong)
+    assert wrong.refusals
+    assert "parameter since: expected a whole number, got '-1'" in wrong.refusals[0]
+
+
+@pytest.mark.parametrize(("what", "alone"), [("hole", "K21"), ("wall", None)])
+def test_a_hole_of_a_wall_is_exported_alone_and_the_wall_whole(
+    what: str, alone: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged = SimpleNamespace(judgement="judged", wall="wall", problem="")
+    model: Any = SimpleNamespace(
+        wall=SimpleNamespace(hole="K21", judged=lambda survey, bit: judged), string=SimpleNamespace(bit=3.0)
+    )
+    monkeypatch.setattr(exports, "survey_of", lambda model: "survey")
+    monkeypatch.setattr(exports, "site_of_wall", lambda *given: given)
+    day = datetime.date(2026, 2, 3)
+    assert exports.live_site(model, what, {"grid_crs": "EPSG:1"}, day) == (("wall", "judged", day, "EPSG:1"), alone)
+    with pytest.raises(SurveyError, match="--origin: the wall's file says"):
+        exports.live_site(model, what, {"origin": "1,2,3"}, day)
+    judged.judgement, judged.problem = None, "no heads"
+    with pytest.raises(SurveyError, match="nothing to export yet: no heads"):
+        exports.live_site(model, what, {}, day)
