@@ -43,10 +43,14 @@ def show_table(title: str, rows: list[dict[str, Any]], columns: Columns, *, side
 
 
 def table_console(least: int = 0) -> Console:
-    """What tables are printed on: the terminal, ``least`` columns wide or more; paper, where there is none."""
+    """What tables are printed on: the terminal, ``least`` columns wide or more; paper, where there is none.
+
+    Nothing in brackets is a style, for names of files, holes and attitudes may have them.
+    """
     from rich.console import Console
 
-    return Console(width=max(Console().width, least) if sys.stdout.isatty() else PAPER)
+    width = max(Console().width, least) if sys.stdout.isatty() else PAPER
+    return Console(width=width, markup=False, emoji=False)
 
 
 def cell_text(value: Any) -> str:
@@ -59,4 +63,4 @@ def cell_text(value: Any) -> str:
 def show_warnings(paper: Console, rows: list[dict[str, Any]]) -> None:
     """Print warnings of what was read, one a line."""
     for row in rows:
-        paper.print(f"WARNING ({row['kind']}): {row['text']}", markup=False)
+        paper.print(f"WARNING ({row['kind']}): {row['text']}")

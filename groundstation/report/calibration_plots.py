@@ -25,7 +25,7 @@ from groundstation.calibration.quality import QualityReport
 from groundstation.report.calibration_sheets import AttitudeErrors, TriadErrors
 from groundstation.report.figure_panels import AFTER, BEFORE, COLOURS, LIMIT, Panel, row_of
 from groundstation.report.style import GREY as QUIET
-from groundstation.report.style import MARKERS
+from groundstation.report.style import MARKERS, plain_text
 
 Array = npt.NDArray[np.float64]
 FEW = 24  # places that still have room for their names
@@ -224,7 +224,8 @@ def _places(axes: Axes, names: Sequence[str]) -> None:
         return
     axes.xaxis.set_major_locator(FixedLocator(list(range(1, len(names) + 1))))
     tight = max(map(len, names)) * len(names) > LETTERS
-    axes.set_xticklabels(names, rotation=35 if tight else 0, ha="right" if tight else "center")
+    shown = [plain_text(name) for name in names]
+    axes.set_xticklabels(shown, rotation=35 if tight else 0, ha="right" if tight else "center")
 
 
 def _open(colour: str) -> dict[str, Any]:

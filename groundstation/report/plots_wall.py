@@ -27,6 +27,7 @@ from groundstation.report.style import (
     WRONG,
     draw_covariance_ellipse,
     new_figure,
+    plain_text,
     styled,
     tidy_ticks,
 )
@@ -48,9 +49,9 @@ UPRIGHT = PlaneWords()
 
 
 def joint_name(columns: Columns, found: Joints, joint: int) -> str:
-    """Names of the two columns of a joint."""
+    """Names of the two columns of a joint, for a figure."""
     a, b = found.pairs[joint]
-    return f"{columns.names[a]}–{columns.names[b]}"
+    return plain_text(f"{columns.names[a]}–{columns.names[b]}")
 
 
 def band_of_thickness(columns: Columns, found: Joints, joint: int) -> tuple[Array, Array]:
@@ -300,7 +301,7 @@ def _zoom(axes: Axes, columns: Columns, found: Joints, bad: npt.NDArray[np.bool_
         if free and np.all(np.abs(drawn[k] - middle) < half - 0.2 * radius):
             labels.append(place)
             weight = "bold" if k in (a, b) else "normal"
-            axes.text(place[1], place[0], columns.names[k], ha="center", va="center", weight=weight)
+            axes.text(place[1], place[0], plain_text(columns.names[k]), ha="center", va="center", weight=weight)
     thick = float(found.thickness[joint, depth])
     if np.isfinite(thick):  # a gap lies along the line of the centres
         ends = 0.5 * (first + second) + 0.5 * abs(thick) * (across if thick > 0.0 else along) * np.array(

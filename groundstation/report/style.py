@@ -98,10 +98,15 @@ def svg_of(figure: Figure) -> str:
 
 
 def new_figure(height: float, title: str) -> Figure:
-    """Empty figure, ``height`` in inches."""
+    """Empty figure, ``height`` in inches; the title stands in it as it is."""
     figure = Figure(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.06))
-    figure.suptitle(title, x=0.01, ha="left", weight="bold")
+    figure.suptitle(plain_text(title), x=0.01, ha="left", weight="bold")
     return figure
+
+
+def plain_text(name: str) -> str:
+    """A name as it stands, for a figure: between two dollar signs matplotlib would read a formula."""
+    return name.replace("$", r"\$")
 
 
 def tick_text(value: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,8 @@ def write_wall(folder: Path, scenario: Scenario) -> Path:
     length = design.length_m or rig.tubes * rig.tube_length_m
     path = folder / WALL_FILE
     path.write_text(
-        f'name = "{site.name}"\nradius_m = {site.radius_m}\nthickness_m = {site.thickness_m}\nlength_m = {length}\n'
+        f"name = {json.dumps(site.name)}\nradius_m = {site.radius_m}\n"
+        f"thickness_m = {site.thickness_m}\nlength_m = {length}\n"
         f'heads = "{HEADS_FILE}"\nstations = "{STATIONS_FILE}"\n'
     )
     with (folder / HEADS_FILE).open("w", newline="") as file:

@@ -139,4 +139,4 @@ def _show(rows: Sequence[dict[str, Any]], files: Sequence[Path]) -> None:
         table.add_row(row["sensor"], row["when"], *numbers, off, row["unit"])
     paper.print(table)
     for path in files:
-        paper.print(f"wrote {path}", soft_wrap=True, highlight=False, markup=False)
+        paper.print(f"wrote {path}", soft_wrap=True, highlight=False)

@@ -164,9 +164,9 @@ def show_sheet(sheet: Sheet, files: Sequence[Path]) -> None:
     from rich.table import Table
 
     paper = table_console(110)
-    paper.print(f"[bold]{sheet.title}[/bold]")
+    paper.print(sheet.title, style="bold")
     for name, value in sheet.facts:
-        paper.print(f"{name:24} {value}", soft_wrap=True, highlight=False, markup=False)
+        paper.print(f"{name:24} {value}", soft_wrap=True, highlight=False)
     for given in sheet.tables:
         table = Table(title=given.title, title_justify="left")
         for k, column in enumerate(given.columns):
@@ -177,4 +177,4 @@ def show_sheet(sheet: Sheet, files: Sequence[Path]) -> None:
     for warning in sheet.warnings:
         paper.print(f"warning: {warning}", style="yellow", soft_wrap=True, highlight=False)
     for path in files:
-        paper.print(f"wrote {path}", soft_wrap=True, highlight=False, markup=False)
+        paper.print(f"wrote {path}", soft_wrap=True, highlight=False)

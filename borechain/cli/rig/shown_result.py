@@ -13,6 +13,7 @@ from borechain.cli.console_tables import table_console
 def show_result(result: dict[str, Any], folder: Path) -> None:
     """Station table beside the truth, and the figures, for people."""
     from rich.table import Table
+    from rich.text import Text
 
     paper = table_console(100)
     table = Table(title="Stations: measured, below it the truth")
@@ -21,7 +22,7 @@ def show_result(result: dict[str, Any], folder: Path) -> None:
     for s in result["stations"]:
         t = s["truth"]
         lines = [
-            f"{s[key]:.{digits}f}\n[dim]{t[key]:.{digits}f}[/dim]"
+            Text.assemble(f"{s[key]:.{digits}f}\n", (f"{t[key]:.{digits}f}", "dim"))
             for key, digits in (("inclination_deg", 3), ("azimuth_deg", 2), ("north_m", 4), ("east_m", 4), ("tvd_m", 4))
         ]
         sigmas = [f"{100.0 * s[key]:.3f}" for key in ("sigma_north_m", "sigma_east_m")]

@@ -113,7 +113,7 @@ def show_clearance(result: dict[str, Any], title: str) -> None:
         table.add_row(*(f"{value:.3f}" for value in row.values()))
     paper.print(table)
     show_warnings(paper, result["warnings"])
-    paper.print(site_words(result["site"]), markup=False)
+    paper.print(site_words(result["site"]))
     verdict = "clear" if result["clear"] else "TOO NEAR"
     least, nearest = result["least"], result["nearest"]
     decides = min(least["factor"], least["independent_factor"])

@@ -79,9 +79,9 @@ def show_survey(result: dict[str, Any]) -> None:
     from groundstation.survey.requests.site_place import site_words
 
     paper = table_console(110)
-    paper.print(result["read_as"], markup=False)
+    paper.print(result["read_as"])
     show_warnings(paper, result["warnings"])
-    paper.print(site_words(result["site"]), markup=False)
+    paper.print(site_words(result["site"]))
     words = (
         result["method"],
         result["instrument"],

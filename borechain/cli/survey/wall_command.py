@@ -116,19 +116,20 @@ def write_wall_files(judged: JudgedWall, files: WallFiles, books: PaperRequest) 
 def show_wall(result: dict[str, Any]) -> None:
     """Verdict, reasons, worst joints and columns, for people."""
     from rich.table import Table
+    from rich.text import Text
 
     paper = table_console(100)
     colour = "green" if result["verdict"] == "tight" else "bold red"
     frame = f"{result['north']} north, depth from {result['depth_reference']}"
     if result["stations_north"] != result["north"]:
         frame += f", stations read from {result['stations_north']} north"
-    paper.print(f"[{colour}]{result['wall']}: {result['verdict']}[/] ({frame})")
+    paper.print(Text.assemble((f"{result['wall']}: {result['verdict']}", colour), f" ({frame})"))
     ends = {f"{row['tight_from_m']:g} to {row['tight_to_m']:g} m" for row in result["joints"]}
     paper.print(f"to be tight from {ends.pop() if len(ends) == 1 else 'the upper head to the lower toe of each joint'}")
     touching = {finding["text"] for finding in result["findings"]}
     show_warnings(paper, [row for row in result["warnings"] if row["text"] not in touching])
     for finding in result["findings"]:
-        paper.print(f"  {finding['kind']}: {finding['text']}", markup=False)
+        paper.print(f"  {finding['kind']}: {finding['text']}")
     table = Table(title=f"the {min(SHOWN, len(result['joints']))} most doubtful of {len(result['joints'])} joints")
     for name in ("joint", "state", "depth m", "thickness m", "thinnest at m", "P(too thin)", "apart cm", "towards deg"):
         table.add_column(name, justify="right")
