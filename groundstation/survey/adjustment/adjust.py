@@ -25,7 +25,12 @@ from groundstation.survey.adjustment.equations import (
     string_departure,
     string_information,
 )
-from groundstation.survey.adjustment.kernels.observations import add_looks, add_right_sides, linearise_looks
+from groundstation.survey.adjustment.kernels.observations import (
+    add_looks,
+    add_right_sides,
+    linearise_looks,
+    weigh_down,
+)
 from groundstation.survey.adjustment.kernels.path_elimination import (
     eliminate_few,
     eliminate_path,
@@ -141,7 +146,7 @@ def linearise_all(looks: Looks, now: StartingPoint, bases: Array, extra: Further
     """Linearise all looks where the unknowns stand; a look that is far off counts less."""
     count = len(looks)
     jacobians, weights = np.empty((count, 3, 9)), np.empty((count, 3, 3))
-    residuals, yaw_errors = np.empty((count, 3)), np.empty(count)
+    residuals, yaw_errors, squares = np.empty((count, 3)), np.empty(count), np.empty(count)
     linearise_looks(
         looks.station, looks.tube, looks.make_up, looks.force, looks.force_var, looks.yaw, looks.yaw_var,
         now.tangents, bases, now.tubes, now.make_ups, now.gravity, now.play_var, jacobians, weights, residuals,
@@ -149,8 +154,7 @@ def linearise_all(looks: Looks, now: StartingPoint, bases: Array, extra: Further
     )  # fmt: skip
     if len(now.extra):
         residuals -= extra.columns @ now.extra
-    squares = np.einsum("ka,kab,kb->k", residuals, weights, residuals)
-    weights *= np.sqrt(GROSS / np.maximum(squares, GROSS))[:, None, None]
+    weigh_down(residuals, GROSS, weights, squares)
     return Linearised(bases, jacobians, weights, residuals, squares, now.tubes.size)
 
 
@@ -250,13 +254,12 @@ def gather_equations(
     coupled, in_common = np.zeros((count, 4, size + 1)), np.zeros((size + 1, size + 1))
     in_common[:size, :size] = known
     in_common[:size, size] = -known @ departure
-    at_station, by_direction = np.zeros((count, 2, 2)), np.zeros((count, 2, size + 1))
+    at_station = np.zeros((count, 2, 2))
     add_looks(
         looks.station, looks.tube, looks.make_up, linear.jacobians, linear.weights, linear.residuals, extra.columns,
-        linear.gravity_at, at_station, by_direction, in_common,
+        linear.gravity_at, at_station, coupled, in_common,
     )  # fmt: skip
     diagonal[:, :2, :2] += at_station
-    coupled[:, :2] = by_direction
     coupled[:, :, size] += right
     return Equations(diagonal, tied, coupled, in_common, at_station)
 

@@ -86,7 +86,7 @@ def adjust_with(
     for again in range(ROUNDS if np.any(is_turn | is_bent) else 1):
         extra = further_effects(turned, run, sought, now, sizes)
         found = adjust_hole(turned, string, path, extra, replace(now, extra=np.zeros(len(extra.std))))
-        cov = found.common_cov[len(found.common_cov) - len(sizes) :, len(found.common_cov) - len(sizes) :]
+        cov = _cov_of_further(found)
         before, sizes = sizes, found.now.extra + np.where(is_turn, sizes, 0.0)
         more = np.abs(sizes - before)
         enough = np.minimum(SETTLED * np.sqrt(np.diag(cov)), STRAIGHT)
@@ -98,6 +98,13 @@ def adjust_with(
     slices = places_among_further(blunders)
     shares = [_share_of(one, at, sizes, cov, found, told) for one, at in zip(blunders, slices, strict=True)]
     return TakenIn(found, tuple(size for size, _ in shares), tuple(share for _, share in shares))
+
+
+def _cov_of_further(found: Adjusted) -> Array:
+    """Covariance (q, q) of further effects, which are the last of what stations have in common."""
+    if not (count := len(found.extra.std)):
+        return np.zeros((0, 0))  # the whole covariance would be worked out for nothing
+    return found.common_cov[-count:, -count:]
 
 
 def _share_of(

@@ -6,7 +6,12 @@ import numpy as np
 
 from groundstation.survey.adjustment.kernels.carried_bases import carry_bases
 from groundstation.survey.adjustment.kernels.free_parts import free_parts
-from groundstation.survey.adjustment.kernels.observations import add_looks, add_right_sides, linearise_looks
+from groundstation.survey.adjustment.kernels.observations import (
+    add_looks,
+    add_right_sides,
+    linearise_looks,
+    weigh_down,
+)
 from groundstation.survey.adjustment.kernels.path_elimination import (
     eliminate_few,
     eliminate_path,
@@ -31,6 +36,7 @@ def warm_adjustment() -> None:
         first, first, first, forces, one, np.zeros(1), one, tangents, bases, np.zeros((1, 6)), np.zeros(1), 9.8, 1e-6,
         jacobians, weights, residuals, np.zeros(1),
     )  # fmt: skip
+    weigh_down(residuals, 1.0, weights, np.zeros(1))
     extra, common = np.zeros((1, 3, 0)), np.zeros((width + 1, width + 1))
     add_looks(
         first, first, first, jacobians, weights, residuals, extra, 6, np.zeros((1, 2, 2)), np.zeros((1, 2, width + 1)),
