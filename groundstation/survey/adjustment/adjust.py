@@ -21,7 +21,6 @@ from groundstation.survey.adjustment.curvature_size import learnt_curvature
 from groundstation.survey.adjustment.equations import (
     Equations,
     path_equations,
-    path_right_sides,
     string_departure,
     string_information,
 )
@@ -114,7 +113,7 @@ def adjust_hole(
         linear = linearise_all(looks, now, bases, extra)
         departure = string_departure(string, now)
         if is_near and solution is not None:
-            right_sides = path_right_sides(path, now, bases)
+            right_sides = path_equations(path, now, bases)[2]
             solution = solve_again(solution, looks, linear, right_sides, -known @ departure, extra)
         else:
             solution = solve_equations(looks, linear, path_equations(path, now, bases), known, departure, extra)
@@ -190,8 +189,10 @@ def solve_equations(
 
 def tube_columns(looks: Looks, count: int) -> Places:
     """Columns (count,) of tubes from each on are zero at each station and below: no such tube has come there."""
-    highest = np.full(count, -1)
-    np.maximum.at(highest, looks.station, looks.tube)
+    tubes = int(looks.tube.max(initial=-1)) + 1
+    is_there = np.zeros((count, tubes + 1), bool)  # from the highest tube down, and none
+    is_there[:, tubes] = is_there[looks.station, tubes - 1 - looks.tube] = True
+    highest = tubes - 1 - is_there.argmax(axis=1)
     return np.asarray(OF_TUBE * (1 + np.maximum.accumulate(highest[::-1])[::-1]), np.intp)
 
 
@@ -266,9 +267,10 @@ def gather_equations(
 
 def poor_yaws(looks: Looks, count: int) -> Truths:
     """Which of the stations (count,) have looks, and of no look there a yaw that is known well."""
-    best = np.full(count, np.inf)
-    np.minimum.at(best, looks.station, looks.yaw_var)
-    return np.asarray(np.isfinite(best) & (best > POOR_YAW**2))
+    is_seen, is_well = np.zeros((2, count), bool)
+    is_seen[looks.station] = True
+    is_well[looks.station[looks.yaw_var <= POOR_YAW**2]] = True
+    return np.asarray(is_seen & ~is_well)
 
 
 def _stepped(now: StartingPoint, bases: Array, solution: LinearSolution, turns: Truths) -> StartingPoint:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, shares_of_string
-from groundstation.survey.adjustment.equations import KNOWN, leg_steps
+from groundstation.survey.adjustment.equations import known_collar, leg_steps
 from groundstation.survey.adjustment.kernels.path_elimination import reduce_right, substitute_path
 from groundstation.survey.adjustment.kernels.position_sums import position_sums
 from groundstation.survey.adjustment.run_of_stops import TurnCauses
@@ -78,7 +78,7 @@ def _path_weighed(found: Adjusted) -> Array:
     """Information of the path alone times the change of the states (s + 1, 4, p) with what is in common."""
     by_common = found.by_common
     weighed = np.zeros_like(by_common)
-    weighed[0, :2] = _known_collar(found) @ by_common[0, :2]
+    weighed[0, :2] = known_collar(found.path, found.bases) @ by_common[0, :2]
     weighed[0, 2:] = by_common[0, 2:] / found.now.curvature_var
     if len(by_common) > 1:
         go, rigid = leg_steps(found.path)
@@ -88,19 +88,13 @@ def _path_weighed(found: Adjusted) -> Array:
     return weighed
 
 
-def _known_collar(found: Adjusted) -> Array:
-    """Information (2, 2) on the direction at the collar before any look."""
-    basis = found.bases[0]
-    return np.asarray(np.linalg.inv(basis @ found.path.collar_cov @ basis.T + KNOWN * np.eye(2)), np.float64)
-
-
 def _of_collar(found: Adjusted, common: Array, halves: Array, wholes: Array) -> Array:
     """Share (3 s + 3,) of the direction at the collar."""
     at_collar = np.zeros((len(found.path.md), 4, 2))
     at_collar[0, :2] = np.eye(2)
     _solve_chain(found, at_collar)
     states = _summed(found, at_collar, halves, wholes).reshape(-1, 2) + common @ found.by_common[0, :2].T
-    return np.asarray(np.sum((states @ _known_collar(found)) * states, axis=1))
+    return np.asarray(np.sum((states @ known_collar(found.path, found.bases)) * states, axis=1))
 
 
 def _solve_chain(found: Adjusted, right: Array) -> None:

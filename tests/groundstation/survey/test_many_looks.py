@@ -14,7 +14,7 @@ from groundstation.survey.adjustment.adjust import adjust_hole, linearise_all, s
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.equations import (
     path_equations,
-    path_right_sides,
+    path_equations,
     string_departure,
     string_information,
 )
@@ -86,7 +86,7 @@ def test_a_step_of_many_looks_is_that_of_one_matrix_of_all_unknowns(
         patched.setattr(adjust, "MANY", 1)
         patched.setattr(adjust, "TOGETHER", 5)
         found = solve_equations(looks, linear, of_path, known, departure, extra)
-    again = solve_again(found, looks, linear, path_right_sides(drawn.path, now, bases), -known @ departure, extra)
+    again = solve_again(found, looks, linear, path_equations(drawn.path, now, bases)[2], -known @ departure, extra)
     step, cov = dense_solution(drawn, now, extra)
     stds, states = np.sqrt(np.diag(cov)), found.states.size
     for one in (found, again):  # the latter by its right sides alone
