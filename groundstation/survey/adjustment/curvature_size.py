@@ -81,4 +81,3 @@ def curvature_deviance(now: StartingPoint, before: float) -> float:
     by_leg = np.log(now.leg_vars / now.curvature_var) + now.curvature_var / now.leg_vars - 1.0
     of_hole = np.log(now.curvature_var) + before / now.curvature_var
     return float(LEG_KNOWN_AS * by_leg.sum() + HOLE_KNOWN_AS * of_hole)
-

@@ -14,7 +14,6 @@ from groundstation.survey.adjustment.adjust import adjust_hole, linearise_all, s
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.equations import (
     path_equations,
-    path_equations,
     string_departure,
     string_information,
 )

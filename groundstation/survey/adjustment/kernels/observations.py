@@ -149,7 +149,8 @@ def add_looks(
     gravity_at : column of gravity among those of all stations; those of a tube begin at six times its place, those of
         the make-ups follow that of gravity, and further effects are last
     at_station : (s + 1, 2, 2), information on every direction, added to
-    coupled : (s + 1, 2 or more, p + 1), of direction and what stations have in common; the last column is the right side
+    coupled : (s + 1, 2 or more, p + 1), of direction and what stations have in common; the last column is the right
+        side
     in_common : (p + 1, p + 1), of what they have in common, symmetric; the last column is the right side
     """
     count = extra.shape[2]
@@ -181,9 +182,15 @@ def add_looks(
             for b in range(a, width + 1):
                 total = rows[0, a] * weighed[0, b] + rows[1, a] * weighed[1, b] + rows[2, a] * weighed[2, b]
                 in_common[at[a], at[b]] += total
-    for a in range(1, right):
+    mirror_upper(in_common, right)
+
+
+@kernel
+def mirror_upper(matrix: Array, count: int) -> None:
+    """Put what is above the diagonal below it too, in the first rows and columns."""
+    for a in range(1, count):
         for b in range(a):
-            in_common[a, b] = in_common[b, a]
+            matrix[a, b] = matrix[b, a]
 
 
 @allocating_kernel

@@ -105,7 +105,7 @@ def leg_squares(
         known, and their change for one standard deviation of independent errors in common
     squares, told : (s,) set
     """
-    off, root, carried, lever, passed = np.empty(4), np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4)), np.empty(4)
+    off, root, carried, lever = np.empty(4), np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
     for k in range(len(squares)):
         leg_departure(k, go, tangents, bases, curvatures, off)
         root[:] = 0.0
@@ -129,15 +129,26 @@ def leg_squares(
                     for m in range(4):
                         cov += lever[a, i] * own_covs[k, i, m] * lever[b, m]
                 of_errors += rigid[k, a, b] * cov
-        for c in range(columns.shape[2]):
-            for a in range(4):
-                passed[a] = columns[k + 1, a, c]
-                for b in range(4):
-                    passed[a] -= go[k, a, b] * columns[k, b, c]
-            for a in range(4):
-                for b in range(4):
-                    of_errors += passed[a] * rigid[k, a, b] * passed[b]
-        squares[k], told[k] = square, of_errors
+        squares[k] = square
+        told[k] = of_errors + departed_squares(go[k], rigid[k], columns[k], columns[k + 1], off)
+
+
+@kernel
+def departed_squares(go: Array, rigid: Array, upper: Array, lower: Array, off: Array) -> float:
+    """Weighted squares, summed, of what changes (4, p) of a state and of the one below make their leg depart by.
+
+    ``off`` (4,) is to work in.
+    """
+    total = 0.0
+    for c in range(upper.shape[1]):
+        for a in range(4):
+            off[a] = lower[a, c]
+            for b in range(4):
+                off[a] -= go[a, b] * upper[b, c]
+        for a in range(4):
+            for b in range(4):
+                total += off[a] * rigid[a, b] * off[b]
+    return total
 
 
 @allocating_kernel
