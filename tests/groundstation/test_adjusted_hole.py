@@ -21,9 +21,8 @@ from groundstation.service.alarms.verdict_doubts import known_of
 from groundstation.service.alarms.verdict_words import VerdictDoubt, Word
 from groundstation.service.answers.adjustment_views import budget_of_toe
 from groundstation.service.answers.model import RigModel
-from groundstation.service.hole import beginnings
 from groundstation.service.hole.examined_hole import UNSOLVED
-from groundstation.survey.adjustment import adjust
+from groundstation.survey.adjustment import normal_equations
 from groundstation.survey.adjustment.linear_solution import WIDE
 from groundstation.survey.adjustment.looks import OF_TUBE
 from groundstation.survey.adjustment.tube_biases import bias_of_tube
@@ -211,8 +210,7 @@ def test_many_looks_of_few_or_more_stops_are_adjusted_the_same_in_any_order(
     So many are many here already that the unknowns are (``WIDE``): a third of the tubes takes a twentieth of the time.
     """
     tubes, many = 34, 500
-    for module in (adjust, beginnings):
-        monkeypatch.setattr(module, "MANY", many)
+    monkeypatch.setattr(normal_equations, "MANY", many)
     placed = [
         (survey(tube, stop, tubes - tube + 1, 1.0 + 0.01 * (stop + tubes - tube)), 2.0 * (stop + tubes - tube))
         for stop in range(1, stops + 1)

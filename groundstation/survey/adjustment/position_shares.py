@@ -69,7 +69,7 @@ def _of_path(found: Adjusted, by_common: Array, common: Array, halves: Array, wh
     both, squares = _path_weighed(found)
     _solve_chain(found, both)
     crossed = _summed(found, both, halves, wholes).reshape(by_common.shape)  # a^T P B, for S a is the position
-    whole = own[:, 1].reshape(-1) + np.sum(common * (2.0 * crossed + times_lower(common, halved(squares))), axis=1)
+    whole = own[:, 1].reshape(-1) + np.sum(common * (2.0 * crossed + times_lower(common, as_triangle(squares))), axis=1)
     collar = _of_collar(found, common, halves, wholes)
     return collar, whole - collar
 
@@ -94,7 +94,7 @@ def _path_weighed(found: Adjusted) -> tuple[Array, Array]:
     return weighed, flat.T @ flat
 
 
-def halved(symmetric: Array) -> Array:
+def as_triangle(symmetric: Array) -> Array:
     """Lower triangular matrix T with x^T T x = x^T S x for every x, of a symmetric S (p, p)."""
     return np.asarray(np.tril(symmetric) + np.tril(symmetric, -1))
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.adjustment.adjust import adjust_hole, linearise_all
+from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.collar import untold_collar
@@ -38,6 +38,7 @@ from groundstation.survey.adjustment.hypotheses import (
 )
 from groundstation.survey.adjustment.kernels.path_elimination import eliminate_path
 from groundstation.survey.adjustment.looks import FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
+from groundstation.survey.adjustment.normal_equations import linearise_all
 from groundstation.survey.adjustment.play import PLAY_KNOWN_AS
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.sphere import bends_between, carried_bases
