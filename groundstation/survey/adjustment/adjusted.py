@@ -57,6 +57,14 @@ class Adjusted:
     solution: LinearSolution
     known: Array
 
+    @cached_property
+    def forces_of_tubes(self) -> tuple[Array, Places]:
+        """Mean force (m, 3), m/s^2, of the looks of every tube, and how many (m,) there are."""
+        tube, count = self.looks.tube, self.string.count
+        counts = np.bincount(tube, minlength=count)
+        sums = np.stack([np.bincount(tube, one, minlength=count) for one in self.looks.force.T], axis=1)
+        return sums / np.maximum(counts, 1)[:, None], counts
+
     def without_looks(self) -> Adjusted:
         """Directions and their covariance alone: what is kept of looks (n,) where no look is asked about any more."""
         of_looks = ("jacobians", "weights", "residuals", "squares")
@@ -185,12 +193,12 @@ class Adjusted:
         )  # fmt: skip
         return found
 
-    @property
+    @cached_property
     def squares(self) -> float:
         """Weighted sum of squares of what the looks leave."""
         return float(np.einsum("ka,kab,kb->", self.left, self.linear.weights, self.left))
 
-    @property
+    @cached_property
     def redundancy(self) -> float:
         """What that sum is to be."""
         told = self.solution.told_by(self.own_covs[:, :2, :2], self.direction_columns, self.known)

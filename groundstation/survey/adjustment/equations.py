@@ -59,13 +59,13 @@ def path_equations(path: PathPrior, start: StartingPoint, bases: Array) -> tuple
 
 def collar_bend(path: PathPrior, start: StartingPoint, bases: Array) -> Array:
     """Bend (2,), rad, from the direction at the collar to that which was told."""
-    return bends_between(np.stack([start.tangents[0], path.collar]), bases[:1].repeat(2, axis=0))[0]
+    return np.asarray(bends_between(np.stack([start.tangents[0], path.collar]), bases[:1].repeat(2, axis=0))[0])
 
 
 def known_collar(path: PathPrior, bases: Array) -> Array:
     """Information (2, 2) on the direction at the collar before any look."""
     (a, b), (_, c) = (bases[0] @ path.collar_cov @ bases[0].T + KNOWN * np.eye(2)).tolist()
-    return np.array([[c, -b], [-b, a]]) / (a * c - b * b)
+    return np.asarray(np.array([[c, -b], [-b, a]]) / (a * c - b * b))
 
 
 def leg_steps(path: PathPrior) -> tuple[Array, Array]:
