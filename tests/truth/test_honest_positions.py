@@ -87,7 +87,7 @@ def test_one_hole_is_stated_as_it_bends_itself(curvature: float) -> None:
 @pytest.mark.parametrize("length", [10.0, 40.0])
 @pytest.mark.parametrize(("curvature", "freedom"), [(0.14, math.inf), (STATED_DEG, FREEDOM)])
 def test_another_length_than_the_assumed_is_in_what_is_said(length: float, curvature: float, freedom: float) -> None:
-    """Curvatures that are forgotten over half and twice the 20 m that are assumed: that differs by less than a tenth."""
+    """Curvatures that are forgotten over half and twice the 20 m that are assumed."""
     check_squares(squares_of(replace(VERTICAL, seed=17, curvature=curvature, freedom=freedom, length=length)))
 
 
