@@ -1,7 +1,8 @@
 """A hole adjusted with blunders that are taken in: as further unknowns, or put right in the looks themselves.
 
 A step of a bias is a further unknown with a wide prior. A turn is so too, and the looks are turned back by what is
-found until nothing more is, for a turn of many degrees is not linear; nor is a wrong depth where the hole bends, and
+found until nothing more is, for a turn of many degrees is not linear (a large one is begun with as the stations that
+were seen before tell it, see ``coarse_turns``); nor is a wrong depth where the hole bends, and
 what a tilt does hangs on the lean of the hole, which it has spoilt, so columns are made at least twice. After some
 rounds only a turn is waited for: a tilt or depth that is not there need not settle (it doubles from round to round, and
 collapses), and some size on that way may fit the looks better than what is wrong. What has a known size (axes or tubes
@@ -20,6 +21,7 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
+from groundstation.survey.adjustment.coarse_turns import coarse_turns
 from groundstation.survey.adjustment.collar import untold_collar
 from groundstation.survey.adjustment.curvature_size import curvature_deviance
 from groundstation.survey.adjustment.equations import path_equations, string_departure
@@ -83,7 +85,8 @@ def adjust_with(
         path = untold_collar(path)
     now = replace(start or first_start(looks, string, path), extra=np.zeros(0))
     is_turn, is_bent = (_is_of(sought, kinds) for kinds in (BY_TURN, BENT))
-    sizes, turned = np.zeros(len(is_turn)), looks
+    sizes = np.repeat(coarse_turns(looks, string, path, run, sought), [WIDTHS[one.kind] for one in sought])
+    turned = _turned_back(looks, run, sought, sizes)
     for again in range(ROUNDS if np.any(is_turn | is_bent) else 1):
         extra = further_effects(turned, run, sought, now, sizes)
         found = adjust_hole(turned, string, path, extra, replace(now, extra=np.zeros(len(extra.std))))
