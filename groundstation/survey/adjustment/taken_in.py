@@ -2,11 +2,11 @@
 
 A step of a bias is a further unknown with a wide prior. A turn is so too, and the looks are turned back by what is
 found until nothing more is, for a turn of many degrees is not linear (a large one is begun with as the stations that
-were seen before tell it, see ``coarse_turns``); nor is a wrong depth where the hole bends, and
-what a tilt does hangs on the lean of the hole, which it has spoilt, so columns are made at least twice. After some
-rounds only a turn is waited for: a tilt or depth that is not there need not settle (it doubles from round to round, and
-collapses), and some size on that way may fit the looks better than what is wrong. What has a known size (axes or tubes
-exchanged) is put right in the looks. Source: Teunissen, "An integrity and quality control procedure for use in multi
+were seen before tell it, see ``coarse_turns``); nor is a wrong depth where the hole bends, and what a tilt does hangs
+on the lean of the hole, which it has spoilt, so columns are made at least twice. After some rounds only a turn is
+waited for: a tilt or depth that is not there need not settle (it doubles from round to round, and collapses), and some
+size on that way may fit the looks better than what is wrong. What has a known size (axes or tubes exchanged) is put
+right in the looks. Source: Teunissen, "An integrity and quality control procedure for use in multi
 sensor integration", ION GPS (1990): detection, identification, adaptation.
 """
 

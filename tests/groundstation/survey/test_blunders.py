@@ -278,7 +278,7 @@ def test_a_turn_of_any_size_leaves_the_hole_as_it_was(honest: DrawnString, deg: 
 @pytest.mark.parametrize("deg", [-100.0, 170.0])
 @pytest.mark.parametrize("seed", [0, 2])
 def test_a_large_turn_beside_a_tilt_is_found_too(deg: float, seed: int) -> None:
-    """From no turn on the search ends elsewhere: 38 deg in place of 100, with a play of 0.24 deg that hides the rest."""
+    """From no turn on the search ends elsewhere: 38 deg in place of 100, and a play of 0.24 deg hides the rest."""
     drawn = draw_string(seed, "tilt_slipped", 2.0)
     check_turn(drawn, deg, drawn.onset - 1, [Hypothesis(K.TILT_SLIPPED, (drawn.tube,), drawn.onset)])
 
