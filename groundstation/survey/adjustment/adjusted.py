@@ -104,6 +104,8 @@ class Adjusted:
     @cached_property
     def direction_columns(self) -> Array:
         """Change of every direction (s + 1, 2, p), likewise: half of the work, where curvatures are not asked for."""
+        if "columns" in self.__dict__:
+            return np.ascontiguousarray(self.columns[:, :2])
         width = self.by_common.shape[2]
         flat = np.ascontiguousarray(self.by_common[:, :2]).reshape(-1, width)
         return self.solution.in_common.times_root(flat).reshape(-1, 2, width)

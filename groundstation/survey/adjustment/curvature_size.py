@@ -61,7 +61,8 @@ def bends_seen(found: Adjusted) -> tuple[Array, Array]:
     )  # fmt: skip
     free = STATE - told / now.leg_vars
     at_collar = now.curvatures[0]
-    free_at_collar = 2.0 - float(np.trace(found.covs[0, 2:, 2:])) / now.curvature_var
+    of_collar = found.own_covs[0] + found.columns[0] @ found.columns[0].T
+    free_at_collar = 2.0 - float(np.trace(of_collar[2:, 2:])) / now.curvature_var
     return np.append(at_collar @ at_collar, of_legs), np.append(free_at_collar, free)
 
 

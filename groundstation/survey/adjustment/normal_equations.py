@@ -21,7 +21,7 @@ from groundstation.survey.adjustment.kernels.path_elimination import (
     reduce_right,
     substitute_path,
 )
-from groundstation.survey.adjustment.linear_solution import InCommon, LinearSolution
+from groundstation.survey.adjustment.linear_solution import WIDE, InCommon, LinearSolution
 from groundstation.survey.adjustment.looks import OF_TUBE, FurtherEffects, Looks, StartingPoint
 
 Array = npt.NDArray[np.float64]
@@ -65,7 +65,7 @@ def solve_equations(
     diagonal, tied, coupled, in_common = equations.diagonal, equations.tied, equations.coupled, equations.in_common
     size, own = len(known), coupled[:, :, -1]
     whole = in_common[:size, :size].copy()
-    if not are_many(looks):
+    if size < WIDE:
         eliminate_path(diagonal, tied, coupled)
         wide = coupled.reshape(-1, coupled.shape[2])
         in_common -= wide.T @ wide

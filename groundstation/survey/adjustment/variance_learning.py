@@ -64,8 +64,8 @@ class VarianceLearning:
         now = found.now
         if self.is_done:
             return now
-        play = learnt_play(found, found.string.play_std**2, PLAY_KNOWN_AS)
         bends = learnt_curvature(found) if again and not self._is_bent else None
+        play = learnt_play(found, found.string.play_std**2, PLAY_KNOWN_AS)
         if bends is not None:
             self._is_bent = bool(np.all(np.abs(np.log(bends[1] / now.leg_vars)) <= LEGS_SETTLED))
         is_near, is_played = step < NEAR, abs(play - now.play_var) <= PLAY_SETTLED * now.play_var
