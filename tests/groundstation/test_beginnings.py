@@ -7,7 +7,7 @@ import pytest
 from string_passes import knowing, passes
 
 from groundstation.service.answers.model import RigModel
-from groundstation.service.hole import beginnings
+from groundstation.survey.adjustment import normal_equations
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.fusion.shared import KIND_NAMES, SharedErrors
@@ -21,7 +21,7 @@ def adjusted(model: RigModel) -> Adjusted:
 
 
 def test_many_looks_come_to_the_same_whatever_was_asked_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(beginnings, "MANY", 150)
+    monkeypatch.setattr(normal_equations, "MANY", 150)
     measurements = passes(STOPS, lambda _stop, station: 1.0 + 0.02 * station)
     known, more = measurements[:-STOPS], measurements[-STOPS:]
     asked = knowing(tmp_path, known, STOPS)

@@ -22,6 +22,7 @@ MG = 1e-3 * 9.81
 class Case:
     """What is drawn of a world; degrees, metres, m/s^2.
 
+    ``length`` is that over which the holes forget their curvature; the adjustment is told ``LENGTH``, whatever it is.
     ``left_out`` are looks that are missing, ``repeated`` stops that are made twice; ``untold`` tubes have a joint above
     them of which nothing is known.
     """
@@ -43,6 +44,7 @@ class Case:
     collar: float = 0.5
     curvature: float = 0.15
     freedom: float = math.inf
+    length: float = LENGTH
     told: float = 0.0
     same_tool_face: bool = False
     left_out: frozenset[int] = frozenset()
@@ -95,7 +97,7 @@ def draw_worlds(case: Case) -> Worlds:
     rng = np.random.default_rng(case.seed)
     md = np.concatenate([[0.0], np.cumsum(np.resize(case.legs, case.stations))])
     collar = direction(case.inclination * DEG, case.azimuth * DEG)
-    holes = draw_holes(rng, case.worlds, md, collar, case.collar * DEG, sizes_of(case), LENGTH)
+    holes = draw_holes(rng, case.worlds, md, collar, case.collar * DEG, sizes_of(case), case.length)
     count = case.tubes
     joints = np.full(count, case.joint * DEG)
     joints[list(case.untold)] = np.pi / np.sqrt(3.0)

@@ -16,8 +16,9 @@ import numpy.typing as npt
 from groundstation.service.hole.blunder_search import LookedAt
 from groundstation.service.hole.hung_chains import HungChains
 from groundstation.service.hole.resolved_stops import Rows
-from groundstation.survey.adjustment.adjust import MANY, adjust_hole
+from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.looks import OF_TUBE, TURN, PathPrior, StartingPoint, StringPrior
+from groundstation.survey.adjustment.normal_equations import are_many
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
@@ -55,7 +56,7 @@ class Beginnings:
         numbers, rows : of the table, in the order of the looks
         """
         looks, path = seen.looks, seen.path
-        if len(looks) < MANY:
+        if not are_many(looks):
             return None
         start, above = None, np.zeros(1, np.intp)
         for every, kept in zip(EVERY, self._kept, strict=True):

@@ -150,11 +150,13 @@ def are_all(rows: Places, count: int) -> bool:
 
 def number_values(values: npt.NDArray[np.uint32]) -> tuple[list[int], Places]:
     """Different values in the order of their coming, and the place (n,) of each among them."""
-    different, first, which = np.unique(values, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    place = np.empty(len(order), np.intp)
-    place[order] = np.arange(len(order))
-    return different[order].tolist(), place[which]
+    count = len(values)
+    first = np.full(int(values.max(initial=0)) + 1, count)
+    first[values[::-1]] = np.arange(count)[::-1]  # of a value that comes again the last that is written stays
+    different = np.flatnonzero(first < count)
+    different = different[np.argsort(first[different])]
+    first[different] = np.arange(len(different))
+    return different.tolist(), first[values]
 
 
 def stop_numbers(at: Array) -> Places:

@@ -6,12 +6,8 @@ a query asks for it: fifty tubes would keep the ground station busy for the leng
 
 from __future__ import annotations
 
-import itertools
 import math
-from array import array
-from bisect import bisect_left, insort
 from collections.abc import Iterable, Sequence
-from operator import attrgetter
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +20,7 @@ from groundstation.service.hole.examined_hole import ExaminedHole
 from groundstation.service.hole.history import History, Moment
 from groundstation.service.hole.hole_adjustment import HoleAdjustment
 from groundstation.service.hole.hole_depths import HoleDepths
+from groundstation.service.hole.hole_stations import HoleStations
 from groundstation.service.hole.movement import Moved, Movement
 from groundstation.service.hole.position_sources import depth_variance_at_toe, variances_by_source
 from groundstation.service.hole.resolved_stops import ResolvedStops
@@ -77,10 +74,8 @@ class SurveyedHole:
         self._collar = collar_direction(self._config, self._setup)
         self._stops = ResolvedStops()
         self._depths = HoleDepths(self._config, self._setup, self._shared, self._stops)
-        self._station_of: list[SurveyStation] = []  # of each of its rows
-        self._touched: dict[float, SurveyStation] = {}  # by depth (m), to which a stop has come
-        self._stations: list[SurveyStation] = []
-        self._movement = Movement(self._stops, self._station_of)
+        self._stations = HoleStations(self._stops, self._config.station_tolerance)
+        self._movement = Movement(self._stops, self._stations.of_rows)
         self._adjustment = HoleAdjustment(self._config, self._shared)
         if self._run_apart is not None:
             self._adjustment.search_apart(self._run_apart)
@@ -106,23 +101,17 @@ class SurveyedHole:
 
         Returns whether it was taken.
         """
-        at, md = stops.rows["at"].item(row), stops.rows["md"].item(row)
+        at = stops.rows["at"].item(row)
         if self._history.begins_stop(epoch, at):
             self._end_stop()
         if self._is_adjusted:
             self._adjustment.make_room(stops.rows["chain"].item(row))
         stops.rows["number"][row] = self.newest + 1
-        station = self._station_at(md)
-        revised = station.stops.revised_by(stops, row)
-        if revised is None:
-            station.add_stop(stops, row)
-            self._station_of.append(station)
-        elif not station.revise_stop(revised, stops, row):
+        if not self._stations.take_stop(stops, row):
             return False
         self.version += 1
         self.newest += 1
         self._history.on_survey(epoch, at)
-        self._touched[station.md] = station
         self._unsettled_since = min(self._unsettled_since, at)
         self._newest_at = max(self._newest_at, at)
         return True
@@ -185,7 +174,7 @@ class SurveyedHole:
     def stations(self) -> list[SurveyStation]:
         """Stations from the collar down."""
         self.settle()
-        return self._stations
+        return self._stations.all
 
     def has_survey_of(self, tube: int) -> bool:
         """Whether a tube has surveyed below the collar."""
@@ -246,14 +235,8 @@ class SurveyedHole:
         Where the stations are fused one by one it stands beside them, and is worked out when it is asked for.
         """
         if self._examined[0] != self.version:
-            below = self._below
-            station_of_row, rows = np.zeros(len(self._stops), np.intp), array("I")
-            for one in below:
-                rows += one.stops.rows
-            station_of_row[np.array(rows)] = np.arange(1, len(below) + 1).repeat([one.count for one in below])
-            mds = np.array([one.md for one in below])
             try:
-                found = self._adjustment.examine(self._stops, station_of_row, mds, self._collar, self.newest)
+                found = self._adjustment.examine(self._stops, *self._stations.numbered(), self._collar, self.newest)
                 self._is_unsolved = False
             except (np.linalg.LinAlgError, ArithmeticError):
                 found, self._is_unsolved = None, True
@@ -264,11 +247,6 @@ class SurveyedHole:
     def is_unsolved(self) -> bool:
         """Whether its surveys have no solution in common, so that each station stands for itself."""
         return self.examined is None and self._is_unsolved
-
-    @property
-    def _below(self) -> list[SurveyStation]:
-        """Stations below the collar."""
-        return [station for station in self._stations if station.md > 0.0]
 
     def _found(self, station: SurveyStation) -> Direction:
         """Direction of a station without transport; that of the collar is the collar's where the hole is adjusted."""
@@ -325,8 +303,9 @@ class SurveyedHole:
 
     def _adjust(self) -> list[SurveyStation]:
         """Adjust the hole; all of its stations have changed, and so has the direction from which it is drawn."""
-        self._touched, below = {}, self._below
-        for station in self._stations:
+        self._stations.take_touched()
+        below = self._stations.below
+        for station in self._stations.all:
             station.forget_view()
         north = north_std(self._setup)
         self._stands = adjusted_stations(self.examined, below, self._collar, self._shared, north, self._stops)
@@ -338,8 +317,8 @@ class SurveyedHole:
 
     def _fuse(self, since: float) -> list[SurveyStation]:
         """Fuse the stations of which something may have changed since a time (s), together those with one more stop."""
-        by_depth = self._touched | self._movement.judge_since(since)
-        changed, self._touched = [*map(by_depth.__getitem__, sorted(by_depth))], {}
+        by_depth = self._stations.take_touched() | self._movement.judge_since(since)
+        changed = [*map(by_depth.__getitem__, sorted(by_depth))]
         weighting = self._config.weighting
         if weighting is Weighting.BAYES and (grown := [station for station in changed if station.lacks_newest]):
             SurveyStation.fuse_together(grown, self._stops)
@@ -363,7 +342,7 @@ class SurveyedHole:
         self.settle()
         if not self._is_foreseen:
             self._is_foreseen = True
-            here, direction = self._trajectory[-1], self.direction_of(self._stations[-1])
+            here, direction = self._trajectory[-1], self.direction_of(self._stations.all[-1])
             self._projection = project_to_target(here, direction, self._learn(), self._design)
             self._alarms.judge_projection(self._projection, self._newest_at)
 
@@ -382,7 +361,7 @@ class SurveyedHole:
             if self._is_adjusted:
                 return [*self._stands.directions.items()]
             return [(one.md, one.fused(self._config.weighting)) for one in changed if one.md > 0.0]
-        measured = [(one.md, self._found(one)) for one in self._below]
+        measured = [(one.md, self._found(one)) for one in self._stations.below]
         if not measured:
             return []
         mds, directions = zip(*measured, strict=True)
@@ -394,15 +373,3 @@ class SurveyedHole:
         """Deviations of the trajectory as it is drawn."""
         drawn = self._trajectory
         return axis_deviations(drawn.md, drawn.positions, drawn.covs, self._design)
-
-    def _station_at(self, md: float) -> SurveyStation:
-        tolerance = self._config.station_tolerance
-        first = bisect_left(self._stations, md - 2.0 * tolerance, key=attrgetter("md"))
-        for station in itertools.islice(self._stations, first, None):
-            if abs(station.md - md) <= tolerance:
-                return station
-            if station.md > md:
-                break
-        station = SurveyStation(md, self._stops)
-        insort(self._stations, station, key=attrgetter("md"))
-        return station

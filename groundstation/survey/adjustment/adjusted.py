@@ -57,6 +57,14 @@ class Adjusted:
     solution: LinearSolution
     known: Array
 
+    @cached_property
+    def forces_of_tubes(self) -> tuple[Array, Places]:
+        """Mean force (m, 3), m/s^2, of the looks of every tube, and how many (m,) there are."""
+        tube, count = self.looks.tube, self.string.count
+        counts = np.bincount(tube, minlength=count)
+        sums = np.stack([np.bincount(tube, one, minlength=count) for one in self.looks.force.T], axis=1)
+        return sums / np.maximum(counts, 1)[:, None], counts
+
     def without_looks(self) -> Adjusted:
         """Directions and their covariance alone: what is kept of looks (n,) where no look is asked about any more."""
         of_looks = ("jacobians", "weights", "residuals", "squares")
@@ -96,6 +104,8 @@ class Adjusted:
     @cached_property
     def direction_columns(self) -> Array:
         """Change of every direction (s + 1, 2, p), likewise: half of the work, where curvatures are not asked for."""
+        if "columns" in self.__dict__:
+            return np.ascontiguousarray(self.columns[:, :2])
         width = self.by_common.shape[2]
         flat = np.ascontiguousarray(self.by_common[:, :2]).reshape(-1, width)
         return self.solution.in_common.times_root(flat).reshape(-1, 2, width)
@@ -125,21 +135,21 @@ class Adjusted:
     @cached_property
     def left(self) -> Array:
         """What the looks leave (n, 3), m/s^2: read less adjusted."""
-        stepped = np.einsum("kab,kb->ka", self.linear.jacobians, self._step_of_looks)
-        return np.asarray(self.linear.residuals - stepped - self.extra.columns @ self._extra_step)
+        return self.left_of(slice(None))
 
-    @property
-    def _extra_step(self) -> Array:
-        return self.solution.common[self.string.width :]
+    def left_of(self, rows: Places | slice) -> Array:
+        """The same of some looks (r,)."""
+        stepped = np.einsum("kab,kb->ka", self.linear.jacobians[rows], self._step_of_looks(rows))
+        further = self.extra.columns[rows] @ self.solution.common[self.string.width :]
+        return np.asarray(self.linear.residuals[rows] - stepped - further)
 
-    @property
-    def _step_of_looks(self) -> Array:
-        """Last step of the nine unknowns of every look (n, 9)."""
-        size = OF_TUBE * self.string.count
-        tubes = self.solution.common[:size].reshape(-1, OF_TUBE)[self.looks.tube]
-        tubes[:, TURN] += self.solution.common[size + 1 + self.looks.make_up]
-        gravity = np.full((len(self.looks), 1), self.solution.common[size])
-        return np.concatenate([self.solution.states[self.looks.station, :2], tubes, gravity], axis=1)
+    def _step_of_looks(self, rows: Places | slice) -> Array:
+        """Last step of the nine unknowns of some looks (r, 9)."""
+        size, station = OF_TUBE * self.string.count, self.looks.station[rows]
+        tubes = self.solution.common[:size].reshape(-1, OF_TUBE)[self.looks.tube[rows]]
+        tubes[:, TURN] += self.solution.common[size + 1 + self.looks.make_up[rows]]
+        gravity = np.full((len(station), 1), self.solution.common[size])
+        return np.concatenate([self.solution.states[station, :2], tubes, gravity], axis=1)
 
     def cofactor(self, directions: Array, common: Array) -> tuple[Array, Array]:
         """Covariance of all unknowns times columns: of directions (s + 1, 2, r) and of what is in common (p, r).
@@ -155,6 +165,19 @@ class Adjusted:
         found = self.solution.in_common.times_cov(common - of_path)
         states = right + (self.by_common.reshape(-1, len(found)) @ found).reshape(right.shape)
         return states, found
+
+    def covs_with_collar(self, count: int) -> Array:
+        """Covariances (at most ``count``, 4, 2) of the first states with the direction at the collar, as ``cofactor``.
+
+        No station below pulls at it, so the chain is solved from the collar down, no further than that.
+        """
+        solution, first = self.solution, slice(count)
+        right = np.zeros((len(solution.diagonal[first]), 4, 2))
+        right[0, :2] = np.eye(2)
+        reduce_right(solution.diagonal[:1], solution.tied[:1], right[:1])
+        found = solution.in_common.times_cov(-(solution.coupled[0].T @ right[0]))
+        substitute_path(solution.diagonal[first], solution.tied[first], right)
+        return np.asarray(right + self.by_common[first] @ found)
 
     def free_parts(self, rows: Places) -> Array:
         """Part P_k (r, 3, 3) of the inverse covariance of some looks that is free to contradict: W - W J Q J^T W."""
@@ -172,12 +195,12 @@ class Adjusted:
         )  # fmt: skip
         return found
 
-    @property
+    @cached_property
     def squares(self) -> float:
         """Weighted sum of squares of what the looks leave."""
         return float(np.einsum("ka,kab,kb->", self.left, self.linear.weights, self.left))
 
-    @property
+    @cached_property
     def redundancy(self) -> float:
         """What that sum is to be."""
         told = self.solution.told_by(self.own_covs[:, :2, :2], self.direction_columns, self.known)

@@ -169,16 +169,17 @@ def examine_hole(
     known : blunders that were found before, which are taken in; a doubt among them is judged again
     """
     known = tuple(_judged_again(looks, string, path, run, known, place) for place in range(len(known)))
-    now = _begun(looks, string, path, run, _taken_in(known), start)
+    now, more = _begun(looks, string, path, run, _taken_in(known), start)
     found = list(known)
     suspicion, supposed = None, None
-    while suspicion is None and len(found) < MOST_BLUNDERS and is_suspicious(now.found, run):
+    while suspicion is None and len(found) < MOST_BLUNDERS and more:
         blunder = find_blunder(looks, string, path, run, now, _taken_in(found))
         if blunder is None or blunder.best.log_chance > math.log(SUSPECTED) + log_of_stops(looks):
             break
         if blunder.best.log_chance <= math.log(FALSE_ALARM):
             found.append(blunder)
             now = adjust_with(looks, string, path, run, _taken_in(found), now.found.now)
+            more = is_suspicious(now.found, run)
             continue
         if len(np.unique(looks.tube)) == 1:
             break  # of one tube alone only what is known of path and collar speaks against it
@@ -195,15 +196,19 @@ def _begun(
     run: RunOfStops,
     taken_in: tuple[Hypothesis, ...],
     start: StartingPoint | None,
-) -> TakenIn:
-    """A hole adjusted with what is known to be wrong; before more is blamed, play and bends are learnt of all looks."""
-    if start is None or not start.is_learnt:
-        return adjust_with(looks, string, path, run, taken_in, start)
-    if not taken_in:
-        now = adjust_with(looks, string, path, run, (), start)
-        if not is_suspicious(now.found, run):
-            return now
-    return adjust_with(looks, string, path, run, taken_in, replace(start, is_learnt=False))
+) -> tuple[TakenIn, bool]:
+    """A hole adjusted with what is known to be wrong, and whether more seems to be.
+
+    Before more is blamed, play and bends are learnt of all looks.
+    """
+    if start is not None and start.is_learnt:
+        if not taken_in:
+            now = adjust_with(looks, string, path, run, (), start)
+            if not is_suspicious(now.found, run):
+                return now, False
+        start = replace(start, is_learnt=False)
+    now = adjust_with(looks, string, path, run, taken_in, start)
+    return now, is_suspicious(now.found, run)
 
 
 def examine_known(
@@ -224,13 +229,13 @@ def examine_known(
     before : of fewer looks, whose stations, stops and tubes have the places that they had
     """
     known, suspicion = ((), None) if before is None else (before.blunders, before.suspicion)
-    now = _begun(looks, string, path, run, _taken_in(known), start)
+    now, more = _begun(looks, string, path, run, _taken_in(known), start)
     blunders = tuple(_resized(one, now, _taken_in(known)) for one in known)
     supposed = None
     if suspicion is not None:
         supposed = adjust_with(looks, string, path, run, _taken_in([*known, suspicion]), now.found.now).found
-    found = Examination(now.found, blunders, suspicion, supposed)
-    return found, is_suspicious(found.explained, run)
+        more = is_suspicious(supposed, run)
+    return Examination(now.found, blunders, suspicion, supposed), more
 
 
 def _resized(blunder: Blunder, now: TakenIn, taken_in: tuple[Hypothesis, ...]) -> Blunder:

@@ -76,10 +76,7 @@ def collar_departure(found: Adjusted) -> CollarDeparture:
 
 def collar_ties(found: Adjusted) -> tuple[CollarTie, ...]:
     """How the direction at the collar of an adjustment goes with the curvature of its first legs, leg by leg."""
-    one = np.zeros((len(found.path.md), 2, 2))
-    one[0] = np.eye(2)
-    states, _ = found.cofactor(one, np.zeros((found.solution.coupled.shape[2], 2)))
-    states = states[: TIED_LEGS + 1]
+    states = found.covs_with_collar(TIED_LEGS + 1)
     departs = states[1:] - leg_steps(found.path)[0][:TIED_LEGS] @ states[:-1]
     parts = (states[:-1, 2:], departs[:, :2], departs[:, 2:])
     return tuple(itertools.starmap(CollarTie, zip(*(_each_way(part) for part in parts), strict=True)))

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.adjustment.equations import leg_steps, path_departures
+from groundstation.survey.adjustment.equations import STATE, leg_steps, path_departures
+from groundstation.survey.adjustment.kernels.path_legs import leg_squares
 
 if TYPE_CHECKING:
     from groundstation.survey.adjustment.adjusted import Adjusted
@@ -52,13 +53,16 @@ def bends_seen(found: Adjusted) -> tuple[Array, Array]:
 
     Of holes that bend as was taken they are their variance times these numbers in the mean.
     """
-    now = found.now
-    go, rigid = leg_steps(found.path)
-    off = path_departures(found.path, now, found.linear.bases, go)
-    of_legs = np.einsum("ka,kab,kb->k", off, rigid, off)
-    free = off.shape[1] - np.einsum("kab,kba->k", rigid, departure_covs(found, go)) / now.leg_vars
+    now, solution = found.now, found.solution
+    of_legs, told = np.empty((2, len(now.leg_vars)))
+    leg_squares(
+        *leg_steps(found.path), now.tangents, found.bases, now.curvatures, solution.diagonal, solution.tied,
+        found.own_covs, found.columns, of_legs, told,
+    )  # fmt: skip
+    free = STATE - told / now.leg_vars
     at_collar = now.curvatures[0]
-    free_at_collar = 2.0 - float(np.trace(found.covs[0, 2:, 2:])) / now.curvature_var
+    of_collar = found.own_covs[0] + found.columns[0] @ found.columns[0].T
+    free_at_collar = 2.0 - float(np.trace(of_collar[2:, 2:])) / now.curvature_var
     return np.append(at_collar @ at_collar, of_legs), np.append(free_at_collar, free)
 
 
@@ -67,9 +71,8 @@ def curvature_below(found: Adjusted) -> float:
     now, legs = found.now, found.now.leg_vars[1:]
     if len(legs) < FEWEST_BELOW:
         return now.curvature_var
-    go, rigid = leg_steps(found.path)
-    off = path_departures(found.path, now, found.linear.bases, go)[1:]
-    told = float(np.sum(np.einsum("ka,kab,kb->k", off, rigid[1:], off) / legs))
+    off = path_departures(found.path, now, found.bases)[1:]
+    told = float(np.sum(np.einsum("ka,kab,kb->k", off, leg_steps(found.path)[1][1:], off) / legs))
     known = HOLE_KNOWN_AS * found.path.curvature_std**2 + now.curvature_var * told
     return known / (HOLE_KNOWN_AS + OF_LEG * len(legs))
 
@@ -79,14 +82,3 @@ def curvature_deviance(now: StartingPoint, before: float) -> float:
     by_leg = np.log(now.leg_vars / now.curvature_var) + now.curvature_var / now.leg_vars - 1.0
     of_hole = np.log(now.curvature_var) + before / now.curvature_var
     return float(LEG_KNOWN_AS * by_leg.sum() + HOLE_KNOWN_AS * of_hole)
-
-
-def departure_covs(found: Adjusted, go: Array) -> Array:
-    """Covariances (s, 4, 4) of what each leg departs by from going on as the station above it does."""
-    solution, own = found.solution, found.own_covs
-    lower = np.tril(solution.diagonal[1:])  # what is above it is left over
-    carried = -np.linalg.solve(np.swapaxes(lower, 1, 2), solution.tied[1:])
-    lever = carried - go  # of the state above, where what stations have in common is known
-    left = own[1:] - carried @ own[:-1] @ np.swapaxes(carried, 1, 2)
-    in_common = found.columns[1:] - go @ found.columns[:-1]
-    return np.asarray(left + lever @ own[:-1] @ np.swapaxes(lever, 1, 2) + in_common @ np.swapaxes(in_common, 1, 2))

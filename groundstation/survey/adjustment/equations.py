@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.survey.adjustment.kernels.path_legs import add_legs, leg_departures
 from groundstation.survey.adjustment.looks import (
     BIAS,
     OF_TUBE,
@@ -44,36 +45,27 @@ class Equations:
 def path_equations(path: PathPrior, start: StartingPoint, bases: Array) -> tuple[Array, Array, Array]:
     """Blocks (s + 1, 4, 4), ties to the station above (s + 1, 4, 4) and right sides (s + 1, 4) of the path alone."""
     count = len(path.md)
-    diagonal, tied = np.zeros((count, STATE, STATE)), np.zeros((count, STATE, STATE))
-    diagonal[0, :2, :2] += known_collar(path, bases)
-    diagonal[0, 2:, 2:] += 1.0 / start.curvature_var * np.eye(2)
+    diagonal, tied, right = np.zeros((count, STATE, STATE)), np.zeros((count, STATE, STATE)), np.zeros((count, STATE))
+    known = known_collar(path, bases)
+    diagonal[0, :2, :2] = known
+    diagonal[0, 2, 2] = diagonal[0, 3, 3] = 1.0 / start.curvature_var
+    right[0, :2] = known @ collar_bend(path, start, bases)
+    right[0, 2:] = -start.curvatures[0] / start.curvature_var
     if count > 1:
-        go, rigid_legs = leg_steps(path)
-        weight = rigid_legs / start.leg_vars[:, None, None]
-        diagonal[1:] += weight
-        diagonal[:-1] += np.swapaxes(go, 1, 2) @ weight @ go
-        tied[1:] = -weight @ go
-    return diagonal, tied, path_right_sides(path, start, bases)
+        place = (start.tangents, bases, start.curvatures)
+        add_legs(*leg_steps(path), start.leg_vars, *place, diagonal, tied, right)
+    return diagonal, tied, right
+
+
+def collar_bend(path: PathPrior, start: StartingPoint, bases: Array) -> Array:
+    """Bend (2,), rad, from the direction at the collar to that which was told."""
+    return np.asarray(bends_between(np.stack([start.tangents[0], path.collar]), bases[:1].repeat(2, axis=0))[0])
 
 
 def known_collar(path: PathPrior, bases: Array) -> Array:
     """Information (2, 2) on the direction at the collar before any look."""
-    return np.asarray(np.linalg.inv(bases[0] @ path.collar_cov @ bases[0].T + KNOWN * np.eye(2)), np.float64)
-
-
-def path_right_sides(path: PathPrior, start: StartingPoint, bases: Array) -> Array:
-    """Right sides (s + 1, 4) of the path alone."""
-    right = np.zeros((len(path.md), STATE))
-    off = bends_between(np.stack([start.tangents[0], path.collar]), bases[:1].repeat(2, axis=0))[0]
-    right[0, :2] += known_collar(path, bases) @ off
-    right[0, 2:] -= 1.0 / start.curvature_var * start.curvatures[0]
-    if len(right) > 1:
-        go, rigid_legs = leg_steps(path)
-        weight = rigid_legs / start.leg_vars[:, None, None]
-        pull = np.einsum("kab,kb->ka", weight, path_departures(path, start, bases, go))
-        right[1:] -= pull
-        right[:-1] += np.einsum("kab,kb->ka", np.swapaxes(go, 1, 2), pull)
-    return right
+    (a, b), (_, c) = (bases[0] @ path.collar_cov @ bases[0].T + KNOWN * np.eye(2)).tolist()
+    return np.asarray(np.array([[c, -b], [-b, a]]) / (a * c - b * b))
 
 
 def leg_steps(path: PathPrior) -> tuple[Array, Array]:
@@ -89,11 +81,11 @@ def _steps_of(md: bytes, correlation_length: float) -> tuple[Array, Array]:
     return _for_both_axes(go), _for_both_axes(np.asarray(np.linalg.inv(noise), np.float64))
 
 
-def path_departures(path: PathPrior, start: StartingPoint, bases: Array, go: Array) -> Array:
+def path_departures(path: PathPrior, start: StartingPoint, bases: Array) -> Array:
     """By how much (s, 4) each station departs from what the one above it leads to."""
-    bent = np.concatenate([bends_between(start.tangents, bases), np.diff(start.curvatures, axis=0)], axis=1)
-    before = np.concatenate([np.zeros((len(path.md) - 1, 2)), start.curvatures[:-1]], axis=1)
-    return np.asarray(bent - np.einsum("kab,kb->ka", go - np.eye(STATE), before))
+    found = np.empty((len(path.md) - 1, STATE))
+    leg_departures(leg_steps(path)[0], start.tangents, bases, start.curvatures, found)
+    return found
 
 
 def _for_both_axes(matrices: Array) -> Array:

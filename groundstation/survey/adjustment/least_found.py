@@ -32,8 +32,7 @@ def possible_mistakes(looks: Looks, run: RunOfStops) -> list[Hypothesis]:
 
 
 def _of_last_stop(looks: Looks, run: RunOfStops) -> Iterator[Hypothesis]:
-    newest = {int(tube): int(stop) for tube, stop in zip(looks.tube, looks.stop, strict=True)}
-    last = max(newest.values())
+    newest, last = newest_stops(looks), int(looks.stop.max())
     for tube, stop in newest.items():
         yield Hypothesis(K.BIAS_STEPPED, (tube,), stop)
         yield Hypothesis(K.TILT_SLIPPED, (tube,), stop)
@@ -46,9 +45,18 @@ def _of_last_stop(looks: Looks, run: RunOfStops) -> Iterator[Hypothesis]:
         yield Hypothesis(K.DEPTH_WRONG_ONCE, (), last)
 
 
+def newest_stops(looks: Looks) -> dict[int, int]:
+    """Newest stop of every tube, in the order in which tubes first looked."""
+    newest = np.zeros(int(looks.tube.max()) + 1, np.intp)
+    newest[looks.tube] = looks.stop  # in the order of time: of a tube that looks again the last that is written stays
+    tubes, first = np.unique(looks.tube, return_index=True)
+    return {tube: int(newest[tube]) for tube in tubes[np.argsort(first)].tolist()}
+
+
 def worst_of_kinds(told: Sequence[Reliability]) -> list[Reliability]:
     """Of each kind that which does most at the toe when it is not found, to north or east; the worst first."""
-    by_kind = sorted(told, key=lambda one: list(K).index(one.hypothesis.kind))
+    places = {kind: place for place, kind in enumerate(K)}
+    by_kind = sorted(told, key=lambda one: places[one.hypothesis.kind])
     groups = itertools.groupby(by_kind, key=lambda one: one.hypothesis.kind)
     return sorted((max(same, key=unfound_across) for _, same in groups), key=lambda one: -unfound_across(one))
 

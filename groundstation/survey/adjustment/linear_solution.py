@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.survey.adjustment.kernels.observations import mirror_upper
+
 Array = npt.NDArray[np.float64]
 KEPT = ("factor", "cov", "root")  # of equations, whatever stands on their right side
 WIDE = 150  # unknowns, from which on Cholesky's factor is worth its calls: it takes half of what a general inverse does
@@ -50,8 +52,9 @@ class InCommon:
             return np.asarray(np.linalg.inv(self.information), np.float64)
         from scipy.linalg import lapack
 
-        lower = np.tril(lapack.dpotri(self.factor, lower=1)[0])
-        return np.asarray(lower + np.tril(lower, -1).T)
+        found = np.asarray(lapack.dpotri(self.factor, lower=1)[0]).T
+        mirror_upper(found, len(found))
+        return found
 
     @cached_property
     def root(self) -> Array:

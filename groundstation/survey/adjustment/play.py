@@ -52,10 +52,11 @@ def told_by_all(found: Adjusted, weights: Array) -> float:
         looks.station, looks.tube, looks.make_up, linear.jacobians, weights, linear.residuals, found.extra.columns,
         linear.gravity_at, own, coupled, in_common,
     )  # fmt: skip
-    by_common = np.ascontiguousarray(found.by_common[:, :2])
-    both = (own @ by_common + 2.0 * coupled[:, :, :size]).reshape(-1, size)
-    of_common = in_common[:size, :size] + by_common.reshape(-1, size).T @ both
-    return float(np.sum(own * found.own_covs[:, :2, :2]) + np.sum(cov * of_common))
+    both = own @ found.by_common[:, :2] + 2.0 * coupled[:, :, :size]
+    # the covariance is R R^T: times B^T (N B + 2 C) its trace is that of (B R)^T (N B + 2 C) R
+    rooted = found.solution.in_common.times_root(both.reshape(-1, size))
+    of_path = np.sum(rooted * found.direction_columns.reshape(-1, size))
+    return float(np.sum(own * found.own_covs[:, :2, :2]) + of_path + np.sum(cov * in_common[:size, :size]))
 
 
 def faster_play(tried: Sequence[tuple[float, float]]) -> float:

@@ -6,13 +6,16 @@ hole: what a position has in common with others is a running sum, and what is it
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, shares_of_string
-from groundstation.survey.adjustment.equations import KNOWN, leg_steps
+from groundstation.survey.adjustment.equations import known_collar, leg_steps
 from groundstation.survey.adjustment.kernels.path_elimination import reduce_right, substitute_path
+from groundstation.survey.adjustment.kernels.path_legs import weigh_legs
 from groundstation.survey.adjustment.kernels.position_sums import position_sums
 from groundstation.survey.adjustment.run_of_stops import TurnCauses
 
@@ -63,35 +66,44 @@ def _of_path(found: Adjusted, by_common: Array, common: Array, halves: Array, wh
     solution, count = found.solution, len(found.path.md)
     own = np.empty((count, 2, 3))
     position_sums(solution.diagonal, solution.tied, solution.at_station, found.bases, halves, wholes, own)
-    weighed = _path_weighed(found)  # P B
-    both = weighed.copy()
+    both, squares = _path_weighed(found)
     _solve_chain(found, both)
     crossed = _summed(found, both, halves, wholes).reshape(by_common.shape)  # a^T P B, for S a is the position
-    flat = found.by_common.reshape(-1, by_common.shape[1])
-    squares = flat.T @ weighed.reshape(flat.shape)
-    whole = own[:, 1].reshape(-1) + np.sum(common * (2.0 * crossed + common @ squares), axis=1)
+    whole = own[:, 1].reshape(-1) + np.sum(common * (2.0 * crossed + times_lower(common, as_triangle(squares))), axis=1)
     collar = _of_collar(found, common, halves, wholes)
     return collar, whole - collar
 
 
-def _path_weighed(found: Adjusted) -> Array:
-    """Information of the path alone times the change of the states (s + 1, 4, p) with what is in common."""
-    by_common = found.by_common
-    weighed = np.zeros_like(by_common)
-    weighed[0, :2] = _known_collar(found) @ by_common[0, :2]
-    weighed[0, 2:] = by_common[0, 2:] / found.now.curvature_var
+def _path_weighed(found: Adjusted) -> tuple[Array, Array]:
+    """P B (s + 1, 4, p) and B^T P B (p, p), of the information P of the path alone.
+
+    B is the change of the states with what is in common, and P the sum of the squares of what the collar and each leg
+    depart by: as squares it takes half of the work of a product.
+    """
+    by_common, now = found.by_common, found.now
+    weighed, departs = np.zeros((2, *by_common.shape))
+    root = np.linalg.cholesky(known_collar(found.path, found.bases))
+    departs[0, :2] = root.T @ by_common[0, :2]
+    departs[0, 2:] = by_common[0, 2:] / math.sqrt(now.curvature_var)
+    weighed[0, :2], weighed[0, 2:] = root @ departs[0, :2], by_common[0, 2:] / now.curvature_var
     if len(by_common) > 1:
         go, rigid = leg_steps(found.path)
-        pulled = (rigid / found.now.leg_vars[:, None, None]) @ (by_common[1:] - go @ by_common[:-1])
-        weighed[1:] += pulled
-        weighed[:-1] -= np.swapaxes(go, 1, 2) @ pulled
-    return weighed
+        roots = np.asarray(np.linalg.cholesky(rigid / now.leg_vars[:, None, None]))
+        weigh_legs(go, roots, by_common, departs, weighed)
+    flat = departs.reshape(-1, by_common.shape[2])
+    return weighed, flat.T @ flat
 
 
-def _known_collar(found: Adjusted) -> Array:
-    """Information (2, 2) on the direction at the collar before any look."""
-    basis = found.bases[0]
-    return np.asarray(np.linalg.inv(basis @ found.path.collar_cov @ basis.T + KNOWN * np.eye(2)), np.float64)
+def as_triangle(symmetric: Array) -> Array:
+    """Lower triangular matrix T with x^T T x = x^T S x for every x, of a symmetric S (p, p)."""
+    return np.asarray(np.tril(symmetric) + np.tril(symmetric, -1))
+
+
+def times_lower(rows: Array, lower: Array) -> Array:
+    """Rows (r, p) times a lower triangular matrix (p, p)."""
+    from scipy.linalg import blas
+
+    return np.asarray(blas.dtrmm(1.0, lower.T, rows.T).T)  # as the library lays out its matrices
 
 
 def _of_collar(found: Adjusted, common: Array, halves: Array, wholes: Array) -> Array:
@@ -100,7 +112,7 @@ def _of_collar(found: Adjusted, common: Array, halves: Array, wholes: Array) -> 
     at_collar[0, :2] = np.eye(2)
     _solve_chain(found, at_collar)
     states = _summed(found, at_collar, halves, wholes).reshape(-1, 2) + common @ found.by_common[0, :2].T
-    return np.asarray(np.sum((states @ _known_collar(found)) * states, axis=1))
+    return np.asarray(np.sum((states @ known_collar(found.path, found.bases)) * states, axis=1))
 
 
 def _solve_chain(found: Adjusted, right: Array) -> None:

@@ -113,7 +113,7 @@ def late_tests(found: Adjusted) -> list[tuple[Array, Places]]:
     looks = found.looks
     rows = np.flatnonzero(looks.stop > looks.stop.max() - LATEST)
     weights = found.linear.weights[rows]
-    pulled = np.einsum("kab,kb->ka", weights, found.left[rows])
+    pulled = np.einsum("kab,kb->ka", weights, found.left_of(rows))
     order, ends = _from_the_end(looks.tube[rows], looks.stop[rows])
     told = np.full(len(rows), 3)
     sums, whole = _sums(pulled[order], ends), _sums(weights[order], ends)

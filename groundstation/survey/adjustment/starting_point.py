@@ -20,11 +20,12 @@ def first_start(looks: Looks, string: StringPrior, path: PathPrior) -> StartingP
     turns = string.turn.copy()
     vars_of_looks = _vars_of_turns(looks, string)
     is_known = vars_of_looks <= KNOWN_TURN**2 + float(vars_of_looks.min(initial=np.inf))
-    tangents = _mean_directions(looks, looks.yaw - _turns(looks, string, turns), path, is_known.astype(np.float64))
+    yaws = looks.yaw - turns_of_looks(looks, string, turns)
+    tangents = mean_directions(looks, yaws, path, is_known.astype(np.float64))
     if not is_known.all():
         seen_there = np.bincount(looks.station[is_known], minlength=len(path.md)) > 0
         _find_turns(looks, string, turns, tangents, ~is_known & seen_there[looks.station])
-        tangents = _mean_directions(looks, looks.yaw - _turns(looks, string, turns), path, np.ones(len(looks)))
+        tangents = mean_directions(looks, looks.yaw - turns_of_looks(looks, string, turns), path, np.ones(len(looks)))
     tubes = np.zeros((string.count, OF_TUBE))
     tubes[:, TURN], make_ups = turns[: string.count], turns[string.count :]
     curvatures = np.zeros((len(path.md), 2))
@@ -33,7 +34,8 @@ def first_start(looks: Looks, string: StringPrior, path: PathPrior) -> StartingP
     return StartingPoint(tangents, curvatures, tubes, make_ups, string.gravity, string.play_std**2, bends, legs)
 
 
-def _turns(looks: Looks, string: StringPrior, turns: Array) -> Array:
+def turns_of_looks(looks: Looks, string: StringPrior, turns: Array) -> Array:
+    """Turn (n,), rad, of every look, of tubes and make-ups (m + u,)."""
     return turns[looks.tube] + turns[string.count + looks.make_up]
 
 
@@ -50,11 +52,11 @@ def _find_turns(looks: Looks, string: StringPrior, turns: Array, tangents: Array
     wide = np.diag(string.turn_cov) > KNOWN_TURN**2
     for place in np.flatnonzero(wide).tolist():
         own = unknown & ((looks.tube == place) | (string.count + looks.make_up == place))
-        others = np.exp(1j * _turns(looks, string, turns)[own])
+        others = np.exp(1j * turns_of_looks(looks, string, turns)[own])
         turns[place] += np.angle(np.sum(seen[own] * (there[own] * others).conj()))
 
 
-def _mean_directions(looks: Looks, yaws: Array, path: PathPrior, weights: Array) -> Array:
+def mean_directions(looks: Looks, yaws: Array, path: PathPrior, weights: Array) -> Array:
     """Weighted mean directions (s + 1, 3) of the looks at each station, with these yaws (n,) of their tubes."""
     turned = (looks.force[:, 0] + 1j * looks.force[:, 1]) * np.exp(1j * yaws)
     units = np.stack([turned.real, turned.imag, -looks.force[:, 2]], axis=1)

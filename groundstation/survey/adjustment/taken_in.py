@@ -1,11 +1,12 @@
 """A hole adjusted with blunders that are taken in: as further unknowns, or put right in the looks themselves.
 
 A step of a bias is a further unknown with a wide prior. A turn is so too, and the looks are turned back by what is
-found until nothing more is, for a turn of many degrees is not linear; nor is a wrong depth where the hole bends, and
-what a tilt does hangs on the lean of the hole, which it has spoilt, so columns are made at least twice. After some
-rounds only a turn is waited for: a tilt or depth that is not there need not settle (it doubles from round to round, and
-collapses), and some size on that way may fit the looks better than what is wrong. What has a known size (axes or tubes
-exchanged) is put right in the looks. Source: Teunissen, "An integrity and quality control procedure for use in multi
+found until nothing more is, for a turn of many degrees is not linear (a large one is begun with as the stations that
+were seen before tell it, see ``coarse_turns``); nor is a wrong depth where the hole bends, and what a tilt does hangs
+on the lean of the hole, which it has spoilt, so columns are made at least twice. After some rounds only a turn is
+waited for: a tilt or depth that is not there need not settle (it doubles from round to round, and collapses), and some
+size on that way may fit the looks better than what is wrong. What has a known size (axes or tubes exchanged) is put
+right in the looks. Source: Teunissen, "An integrity and quality control procedure for use in multi
 sensor integration", ION GPS (1990): detection, identification, adaptation.
 """
 
@@ -17,9 +18,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.adjustment.adjust import adjust_hole, linearise_all
+from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
+from groundstation.survey.adjustment.coarse_turns import coarse_turns
 from groundstation.survey.adjustment.collar import untold_collar
 from groundstation.survey.adjustment.curvature_size import curvature_deviance
 from groundstation.survey.adjustment.equations import path_equations, string_departure
@@ -38,6 +40,7 @@ from groundstation.survey.adjustment.hypotheses import (
 )
 from groundstation.survey.adjustment.kernels.path_elimination import eliminate_path
 from groundstation.survey.adjustment.looks import FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
+from groundstation.survey.adjustment.normal_equations import linearise_all
 from groundstation.survey.adjustment.play import PLAY_KNOWN_AS
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.sphere import bends_between, carried_bases
@@ -82,11 +85,12 @@ def adjust_with(
         path = untold_collar(path)
     now = replace(start or first_start(looks, string, path), extra=np.zeros(0))
     is_turn, is_bent = (_is_of(sought, kinds) for kinds in (BY_TURN, BENT))
-    sizes, turned = np.zeros(len(is_turn)), looks
+    sizes = np.repeat(coarse_turns(looks, string, path, run, sought), [WIDTHS[one.kind] for one in sought])
+    turned = _turned_back(looks, run, sought, sizes)
     for again in range(ROUNDS if np.any(is_turn | is_bent) else 1):
         extra = further_effects(turned, run, sought, now, sizes)
         found = adjust_hole(turned, string, path, extra, replace(now, extra=np.zeros(len(extra.std))))
-        cov = found.common_cov[len(found.common_cov) - len(sizes) :, len(found.common_cov) - len(sizes) :]
+        cov = _cov_of_further(found)
         before, sizes = sizes, found.now.extra + np.where(is_turn, sizes, 0.0)
         more = np.abs(sizes - before)
         enough = np.minimum(SETTLED * np.sqrt(np.diag(cov)), STRAIGHT)
@@ -98,6 +102,13 @@ def adjust_with(
     slices = places_among_further(blunders)
     shares = [_share_of(one, at, sizes, cov, found, told) for one, at in zip(blunders, slices, strict=True)]
     return TakenIn(found, tuple(size for size, _ in shares), tuple(share for _, share in shares))
+
+
+def _cov_of_further(found: Adjusted) -> Array:
+    """Covariance (q, q) of further effects, which are the last of what stations have in common."""
+    if not (count := len(found.extra.std)):
+        return np.zeros((0, 0))  # the whole covariance would be worked out for nothing
+    return found.common_cov[-count:, -count:]
 
 
 def _share_of(

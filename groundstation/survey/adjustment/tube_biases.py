@@ -28,12 +28,11 @@ class AdjustedBias:
 
 def bias_of_tube(adjusted: Adjusted, place: int) -> AdjustedBias:
     """Bias of the tube at a place of the string."""
-    own = adjusted.looks.tube == place
-    forces = adjusted.looks.force[own]
-    x, y, z = forces.mean(axis=0).tolist()
+    forces, counts = adjusted.forces_of_tubes
+    x, y, z = forces[place].tolist()
     as_bias = np.zeros((3, TILT.stop))
     as_bias[:, :3] = np.eye(3)
     as_bias[:, TILT] = [[0.0, z], [-z, 0.0], [y, -x]]  # what a tilt about x and about y turns the force into
     places = OF_TUBE * place + np.arange(TILT.stop)
     cov = as_bias @ adjusted.common_cov[np.ix_(places, places)] @ as_bias.T
-    return AdjustedBias(as_bias @ adjusted.now.tubes[place, : TILT.stop], cov, int(own.sum()))
+    return AdjustedBias(as_bias @ adjusted.now.tubes[place, : TILT.stop], cov, int(counts[place]))

@@ -6,7 +6,12 @@ import numpy as np
 
 from groundstation.survey.adjustment.kernels.carried_bases import carry_bases
 from groundstation.survey.adjustment.kernels.free_parts import free_parts
-from groundstation.survey.adjustment.kernels.observations import add_looks, add_right_sides, linearise_looks
+from groundstation.survey.adjustment.kernels.observations import (
+    add_looks,
+    add_right_sides,
+    linearise_looks,
+    weigh_down,
+)
 from groundstation.survey.adjustment.kernels.path_elimination import (
     eliminate_few,
     eliminate_path,
@@ -14,6 +19,7 @@ from groundstation.survey.adjustment.kernels.path_elimination import (
     reduce_right,
     substitute_path,
 )
+from groundstation.survey.adjustment.kernels.path_legs import add_legs, leg_departures, leg_squares, weigh_legs
 from groundstation.survey.adjustment.kernels.position_sums import position_sums
 
 
@@ -31,6 +37,7 @@ def warm_adjustment() -> None:
         first, first, first, forces, one, np.zeros(1), one, tangents, bases, np.zeros((1, 6)), np.zeros(1), 9.8, 1e-6,
         jacobians, weights, residuals, np.zeros(1),
     )  # fmt: skip
+    weigh_down(residuals, 1.0, weights, np.zeros(1))
     extra, common = np.zeros((1, 3, 0)), np.zeros((width + 1, width + 1))
     add_looks(
         first, first, first, jacobians, weights, residuals, extra, 6, np.zeros((1, 2, 2)), np.zeros((1, 2, width + 1)),
@@ -45,6 +52,11 @@ def warm_adjustment() -> None:
     reduce_right(diagonal, tied, coupled)
     substitute_path(diagonal, tied, coupled)
     path_covariances(diagonal, tied, np.zeros((1, 4, 4)))
+    legs, place = (diagonal[:0], diagonal[:0]), (tangents, bases, np.zeros((1, 2)))
+    add_legs(*legs, one[:0], *place, diagonal, tied, np.zeros((1, 4)))
+    weigh_legs(*legs, coupled, coupled.copy(), coupled.copy())
+    leg_departures(legs[0], *place, np.zeros((0, 4)))
+    leg_squares(*legs, *place, diagonal, tied, diagonal.copy(), coupled, one[:0].copy(), one[:0].copy())
     position_sums(
         diagonal, tied, np.zeros((1, 2, 2)), bases, np.zeros(1), np.zeros(1), np.zeros((1, 2, 3)),
     )  # fmt: skip

@@ -272,11 +272,24 @@ def test_without_a_blunder_it_is_the_plain_adjustment(honest: DrawnString) -> No
 @pytest.mark.parametrize("deg", [8.0, 60.0, -100.0, 170.0])
 def test_a_turn_of_any_size_leaves_the_hole_as_it_was(honest: DrawnString, deg: float) -> None:
     """A turn is not linear: sought until it is found, the hole is that of the same looks without it."""
-    looks = honest.looks
-    one = Hypothesis(K.ENCODER_SLIPPED, (), 6)
-    yaw = looks.yaw + np.where(looks.stop >= 6, deg * DEG, 0.0)
+    check_turn(honest, deg, 6, [])
+
+
+@pytest.mark.parametrize("deg", [-100.0, 170.0])
+@pytest.mark.parametrize("seed", [0, 2])
+def test_a_large_turn_beside_a_tilt_is_found_too(deg: float, seed: int) -> None:
+    """From no turn on the search ends elsewhere: 38 deg in place of 100, and a play of 0.24 deg hides the rest."""
+    drawn = draw_string(seed, "tilt_slipped", 2.0)
+    check_turn(drawn, deg, drawn.onset - 1, [Hypothesis(K.TILT_SLIPPED, (drawn.tube,), drawn.onset)])
+
+
+def check_turn(drawn: DrawnString, deg: float, since: int, beside: list[Hypothesis]) -> None:
+    """Looks from a stop on whose yaw turned (deg), beside something else that is sought, leave the hole as without."""
+    looks, one = drawn.looks, Hypothesis(K.ENCODER_SLIPPED, (), since)
+    yaw = looks.yaw + np.where(looks.stop >= since, deg * DEG, 0.0)
     without, with_it = (
-        adjust_with(replace(looks, yaw=y), honest.string, honest.path, honest.run, [one]) for y in (looks.yaw, yaw)
+        adjust_with(replace(looks, yaw=y), drawn.string, drawn.path, drawn.run, [one, *beside])
+        for y in (looks.yaw, yaw)
     )
     off = (with_it.sizes[0] - without.sizes[0] - deg * DEG + np.pi) % (2.0 * np.pi) - np.pi
     assert abs(off[0]) < 0.1 * np.sqrt(without.covs[0][0, 0])

@@ -9,17 +9,17 @@ from drawn_strings import DrawnString, draw_string
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from groundstation.survey.adjustment import adjust
-from groundstation.survey.adjustment.adjust import adjust_hole, linearise_all, solve_again, solve_equations
+from groundstation.survey.adjustment import normal_equations
+from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.equations import (
     path_equations,
-    path_right_sides,
     string_departure,
     string_information,
 )
 from groundstation.survey.adjustment.linear_solution import WIDE, InCommon
 from groundstation.survey.adjustment.looks import OF_TUBE, FurtherEffects, StartingPoint
+from groundstation.survey.adjustment.normal_equations import linearise_all, solve_again, solve_equations
 from groundstation.survey.adjustment.sphere import carried_bases
 from groundstation.survey.adjustment.starting_point import first_start
 
@@ -83,10 +83,10 @@ def test_a_step_of_many_looks_is_that_of_one_matrix_of_all_unknowns(
     linear, known = linearise_all(looks, now, bases, extra), string_information(drawn.string, extra)
     of_path, departure = path_equations(drawn.path, now, bases), string_departure(drawn.string, now)
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(adjust, "MANY", 1)
-        patched.setattr(adjust, "TOGETHER", 5)
+        patched.setattr(normal_equations, "MANY", 1)
+        patched.setattr(normal_equations, "TOGETHER", 5)
         found = solve_equations(looks, linear, of_path, known, departure, extra)
-    again = solve_again(found, looks, linear, path_right_sides(drawn.path, now, bases), -known @ departure, extra)
+    again = solve_again(found, looks, linear, path_equations(drawn.path, now, bases)[2], -known @ departure, extra)
     step, cov = dense_solution(drawn, now, extra)
     stds, states = np.sqrt(np.diag(cov)), found.states.size
     for one in (found, again):  # the latter by its right sides alone
@@ -117,7 +117,7 @@ def test_steps_by_equations_of_before_lead_where_whole_ones_do(seed: int, far: f
     start, found = moved_start(drawn, seed, far), list[Adjusted]()
     for many in (1, NEVER):
         with pytest.MonkeyPatch.context() as patched:
-            patched.setattr(adjust, "MANY", many)
+            patched.setattr(normal_equations, "MANY", many)
             found.append(adjust_hole(drawn.looks, drawn.string, drawn.path, start=start))
     one, other = found
     stds = np.sqrt(np.diagonal(other.covs, axis1=1, axis2=2))

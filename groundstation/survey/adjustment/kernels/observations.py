@@ -83,6 +83,27 @@ def linearise_looks(
 
 
 @kernel
+def weigh_down(residuals: Array, gross: float, weights: Array, squares: Array) -> None:
+    """Let looks count less whose weighted square is more than ``gross``.
+
+    Parameters
+    ----------
+    residuals, weights : (n, 3) and (n, 3, 3), of the looks; the latter are scaled
+    squares : (n,) set: weighted squares as they were
+    """
+    for k in range(len(squares)):
+        r, w, total = residuals[k], weights[k], 0.0
+        for a in range(3):
+            total += r[a] * (w[a, 0] * r[0] + w[a, 1] * r[1] + w[a, 2] * r[2])
+        squares[k] = total
+        if total > gross:
+            scale = math.sqrt(gross / total)
+            for a in range(3):
+                for b in range(3):
+                    w[a, b] *= scale
+
+
+@kernel
 def tilt_force(mx: float, my: float, mz: float, tx: float, ty: float, scale: float, out: Array) -> None:
     """Set a vector (3,) to scale times (mx, my, mz) as an IMU feels it that is tilted by tx and ty (rad)."""
     along, size = 0.5 * (tx * mx + ty * my), 1.0 - 0.5 * (tx * tx + ty * ty)
@@ -128,8 +149,9 @@ def add_looks(
     gravity_at : column of gravity among those of all stations; those of a tube begin at six times its place, those of
         the make-ups follow that of gravity, and further effects are last
     at_station : (s + 1, 2, 2), information on every direction, added to
-    coupled : (s + 1, 2, p + 1), of direction and what stations have in common; the last column is the right side
-    in_common : (p + 1, p + 1), of what they have in common; the last column is the right side
+    coupled : (s + 1, 2 or more, p + 1), of direction and what stations have in common; the last column is the right
+        side
+    in_common : (p + 1, p + 1), of what they have in common, symmetric; the last column is the right side
     """
     count = extra.shape[2]
     width = 8 + count
@@ -157,9 +179,18 @@ def add_looks(
             for b in range(width + 1):
                 common[a, at[b]] += j[0, a] * weighed[0, b] + j[1, a] * weighed[1, b] + j[2, a] * weighed[2, b]
         for a in range(width):
-            for b in range(width + 1):
+            for b in range(a, width + 1):
                 total = rows[0, a] * weighed[0, b] + rows[1, a] * weighed[1, b] + rows[2, a] * weighed[2, b]
                 in_common[at[a], at[b]] += total
+    mirror_upper(in_common, right)
+
+
+@kernel
+def mirror_upper(matrix: Array, count: int) -> None:
+    """Put what is above the diagonal below it too, in the first rows and columns."""
+    for a in range(1, count):
+        for b in range(a):
+            matrix[a, b] = matrix[b, a]
 
 
 @allocating_kernel
