@@ -1,6 +1,6 @@
 """Files that may hold several tables of stations: sheets of a workbook, sections of a log, results of a document.
 
-None is taken for the only one: a second hole that nobody reads would be a hole that was never surveyed.
+None is taken for the only one: a second hole that is not read would be a hole that was never surveyed.
 """
 
 from __future__ import annotations

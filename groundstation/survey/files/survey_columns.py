@@ -74,7 +74,7 @@ def _named(cell: str, place: int) -> NamedColumn | None:
 
 
 def unknown_unit(cells: list[str]) -> NamedColumn | None:
-    """The first column that has a name of ours and a unit of nobody's, where a quantity is missing by it."""
+    """The first column that has a name of ours and a unit that is not known, where a quantity is missing by it."""
     have = {column.quantity for column in named_columns(cells)}
     for place, cell in enumerate(cells):
         words = _words(cell)

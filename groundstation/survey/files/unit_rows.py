@@ -1,4 +1,4 @@
-"""Rows of units below a header, and units that nobody knows: both are said of a column by its name."""
+"""Rows of units below a header, and units that are not known: both are said of a column by its name."""
 
 from __future__ import annotations
 
