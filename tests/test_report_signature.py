@@ -6,12 +6,14 @@ import datetime
 import random
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 from click.testing import CliRunner, Result
+from cryptography import x509
 
 from borechain.cli.pki.pki import pki
 from borechain.pki.pdf_revisions import SignedFileError, signed_revisions
@@ -159,6 +161,48 @@ def test_another_program_verifies_the_signature(signed: Signed, tmp_path: Path) 
         (tmp_path / "c").write_bytes(text)
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, check=False)
         assert (done.returncode == 0) is is_good, done.stderr
+
+
+def test_a_persons_certificate_is_good_for_signing_what_is_read(signed: Signed) -> None:
+    """Readers of PDF trust no other: its key commits to contents; that of the router and the authority does not."""
+    for name, commits in (("anna", True), ("operator", True), ("router", False), ("ca", False)):
+        certificate = x509.load_pem_x509_certificate((signed.folder / f"{name}.pem").read_bytes())
+        usage = certificate.extensions.get_extension_for_class(x509.KeyUsage)
+        assert (usage.critical, usage.value.digital_signature, usage.value.content_commitment) == (True, True, commits)
+
+
+PYHANKO = """
+import sys
+from pyhanko.keys import load_cert_from_pemder
+from pyhanko.pdf_utils.reader import PdfFileReader
+from pyhanko.sign.validation import validate_pdf_signature
+from pyhanko_certvalidator import ValidationContext
+
+context = ValidationContext(trust_roots=[load_cert_from_pemder(sys.argv[2])], allow_fetching=False)
+for one in PdfFileReader(open(sys.argv[1], "rb")).embedded_signatures:
+    found = validate_pdf_signature(one, context)
+    print(one.field_name, found.trusted, found.bottom_line)
+"""
+
+
+@pytest.mark.install
+@pytest.mark.statistical
+def test_a_library_of_pdf_signatures_trusts_the_authority_and_no_other(tmp_path: Path) -> None:
+    """pyHanko with an environment of its own: trusted with our authority as its root, and not with another."""
+    now = datetime.datetime.now(datetime.UTC).replace(microsecond=0)
+    for rig in ("rig-1", "rig-2"):
+        (tmp_path / rig).mkdir()
+        init_rig(tmp_path / rig, rig, now)
+    python = tmp_path / "hanko" / "bin" / "python"
+    subprocess.run([sys.executable, "-m", "venv", tmp_path / "hanko"], check=True)
+    subprocess.run([python, "-m", "pip", "install", "--quiet", "pyhanko>=0.29"], check=True, capture_output=True)
+    once = sign_report(report_pdf(PAPER), tmp_path / "rig-1" / "driller.pem", now)
+    report = tmp_path / "report.pdf"
+    report.write_bytes(sign_report(once, tmp_path / "rig-1" / "operator.pem", now))
+    for rig, trusted in (("rig-1", "True True"), ("rig-2", "False False")):
+        command = [python, "-c", PYHANKO, report, tmp_path / rig / "ca.pem"]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        assert done.stdout.splitlines() == [f"Signature{number} {trusted}" for number in (1, 2)]
 
 
 def run(*words: object) -> Result:

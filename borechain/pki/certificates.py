@@ -39,17 +39,7 @@ def make_authority(folder: Path, rig: str, now: datetime.datetime) -> None:
     """
     key = generate_private_key(SECP256R1())
     name = _name(f"borechain {rig}")
-    usage = x509.KeyUsage(
-        digital_signature=True,
-        content_commitment=False,
-        key_encipherment=False,
-        data_encipherment=False,
-        key_agreement=False,
-        key_cert_sign=True,
-        crl_sign=True,
-        encipher_only=False,
-        decipher_only=False,
-    )
+    usage = _usage(signs_certificates=True)
     certificate = (
         _builder(name, name, key, now, VALID)
         .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
@@ -89,10 +79,26 @@ def make_certificate(
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
         .add_extension(x509.SubjectAlternativeName([x509.DNSName(name)]), critical=False)
         .add_extension(x509.ExtendedKeyUsage([purpose]), critical=False)
+        .add_extension(_usage(signs_reports=name != ROUTER), critical=True)
         .sign(authority_key, hashes.SHA256())
     )
     write_private(folder / f"{name}.key", _pem_of(key))
     write_file(folder / f"{name}.pem", certificate.public_bytes(serialization.Encoding.PEM).decode())
+
+
+def _usage(*, signs_certificates: bool = False, signs_reports: bool = False) -> x509.KeyUsage:
+    """What a key is good for; readers of PDF trust the signature of one that commits to contents alone."""
+    return x509.KeyUsage(
+        digital_signature=True,
+        content_commitment=signs_reports,
+        key_encipherment=False,
+        data_encipherment=False,
+        key_agreement=False,
+        key_cert_sign=signs_certificates,
+        crl_sign=signs_certificates,
+        encipher_only=False,
+        decipher_only=False,
+    )
 
 
 def _name(common_name: str) -> x509.Name:

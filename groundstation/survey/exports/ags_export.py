@@ -5,14 +5,16 @@ Source: Association of Geotechnical and Geoenvironmental Specialists, AGS 4.1.1.
 
 from __future__ import annotations
 
+import unicodedata
+
 from groundstation.entry.quoted_cells import quoted_cell
 from groundstation.survey.exports.export_hole import ExportHole, ExportSite
 
 Rows = list[tuple[str, ...]]
 ROUNDED = "HORN_ORNT and HORN_INCL are rounded to whole degrees, as the format has them"
 TYPES = (
-    ("ID", "Unique identifier"), ("PA", "Abbreviation"), ("X", "Text"), ("2DP", "Two decimal places"),
-    ("3DP", "Three decimal places"), ("0DP", "No decimal place"), ("DT", "Date"),
+    ("ID", "Unique identifier"), ("PA", "Abbreviation"), ("X", "Text"), ("6DP", "Six decimal places"),
+    ("0DP", "No decimal place"), ("DT", "Date"),
 )  # fmt: skip
 UNITS = (("m", "metre"), ("deg", "degree"), ("yyyy-mm-dd", "year month day"))
 
@@ -35,9 +37,9 @@ def ags_bytes(site: ExportSite) -> bytes:
                [("LOCA_TYPE", "RC", "Rotary cored")]),
         _group("LOCA", ("LOCA_ID", "LOCA_TYPE", "LOCA_NATE", "LOCA_NATN", "LOCA_GREF", "LOCA_GL", "LOCA_REM",
                         "LOCA_FDEP"),
-               ("", "", "m", "m", "", "m", "", "m"), ("ID", "PA", "3DP", "3DP", "X", "3DP", "X", "2DP"), locations),
+               ("", "", "m", "m", "", "m", "", "m"), ("ID", "PA", "6DP", "6DP", "X", "6DP", "X", "6DP"), locations),
         _group("HORN", ("LOCA_ID", "HORN_TOP", "HORN_BASE", "HORN_ORNT", "HORN_INCL", "HORN_REM"),
-               ("", "m", "m", "deg", "deg", ""), ("ID", "2DP", "2DP", "0DP", "0DP", "X"), horn),
+               ("", "m", "m", "deg", "deg", ""), ("ID", "6DP", "6DP", "0DP", "0DP", "X"), horn),
     ]  # fmt: skip
     return "\r\n".join(groups).encode("utf-8")
 
@@ -46,8 +48,8 @@ def _location(hole: ExportHole, crs: str) -> tuple[str, ...]:
     east, north, height = hole.axis[0].tolist()
     words = hole.verdict and f"verdict: {hole.verdict}"
     return (
-        _text(hole.name), "RC", f"{east:.3f}", f"{north:.3f}", crs or "LOCAL", f"{height:.3f}", words,
-        f"{hole.md[-1]:.2f}",
+        _text(hole.name), "RC", f"{east:.6f}", f"{north:.6f}", crs or "LOCAL", f"{height:.6f}", words,
+        f"{hole.md[-1]:.6f}",
     )  # fmt: skip
 
 
@@ -57,7 +59,8 @@ def _intervals(hole: ExportHole) -> Rows:
     for k in range(len(hole.md) - 1):
         azimuth = round(float(hole.azimuth_deg[k])) % 360
         dip = 90 - round(float(hole.inclination_deg[k]))
-        rows.append((_text(hole.name), f"{hole.md[k]:.2f}", f"{hole.md[k + 1]:.2f}", str(azimuth), str(dip), ROUNDED))
+        top, base = f"{hole.md[k]:.6f}", f"{hole.md[k + 1]:.6f}"
+        rows.append((_text(hole.name), top, base, str(azimuth), str(dip), ROUNDED))
     return rows
 
 
@@ -73,5 +76,9 @@ def _group(name: str, heading: tuple[str, ...], units: tuple[str, ...], types: t
 
 
 def _text(text: str) -> str:
-    """What a user wrote, in one line; a spreadsheet, which opens such a file as a table, computes none of it."""
-    return str(quoted_cell(text)).replace('"', '""').replace("\n", " ")
+    """What a user wrote; a spreadsheet, which opens such a file as a table, computes none of it.
+
+    The format has 256 letters (its rule 1); any other stands as its number, so that two names stay two.
+    """
+    plain = unicodedata.normalize("NFC", text).encode("latin-1", "backslashreplace").decode("latin-1")
+    return str(quoted_cell(plain)).replace('"', '""')

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -49,3 +49,14 @@ class ExportSite:
     day: str = "2026-01-01"
     project: str = ""
     client: str = ""
+
+    def in_plain_lines(self) -> ExportSite:
+        """The site with every text in one line of letters that a file of any format can hold."""
+        holes = tuple(replace(hole, name=plain_line(hole.name)) for hole in self.holes)
+        words = {key: plain_line(getattr(self, key)) for key in ("name", "crs", "project", "client")}
+        return replace(self, holes=holes, remarks=tuple(map(plain_line, self.remarks)), **words)
+
+
+def plain_line(text: str) -> str:
+    """Text without letters that are none: ends of lines, controls, halves of a pair from names of files."""
+    return "".join(letter if letter.isprintable() else " " for letter in text)

@@ -111,4 +111,4 @@ def exported_bytes(site: ExportSite, form: str, hole: str | None = None) -> byte
     for one in site.holes:
         if not all(math.isfinite(x) for x in one.axis.ravel().tolist()):
             raise SurveyError(f"{one.name}: its axis has no numbers to export")
-    return FORMATS[form](site)
+    return FORMATS[form](site.in_plain_lines())

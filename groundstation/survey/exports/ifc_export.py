@@ -7,19 +7,30 @@ import uuid
 from groundstation.survey.exports.export_hole import ExportHole, ExportSite
 
 ALPHABET = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"
+LABEL = 255  # letters, the longest name
 THINNEST = 0.05  # m, radius of a hole that has none
 OWN = uuid.UUID("1f2f6c4e-5c2b-5b54-8f6b-4b7c8b0d6f20")  # of names of ours
 
 
 class _StepLines:
-    """Lines of a STEP file, numbered."""
+    """Lines of a STEP file, numbered, and identifiers within its project."""
 
-    def __init__(self) -> None:
+    def __init__(self, project: str) -> None:
         self.lines: list[str] = []
+        self._project = project
 
     def add(self, text: str) -> str:
         self.lines.append(f"#{len(self.lines) + 1}={text};")
         return f"#{len(self.lines)}"
+
+    def guid(self, name: str) -> str:
+        """Identifier of 22 letters, the same for the same thing of the same project."""
+        number = uuid.uuid5(OWN, f"{self._project}/{name}").int
+        letters = []
+        for _ in range(22):
+            number, digit = divmod(number, 64)
+            letters.append(ALPHABET[digit])
+        return "".join(reversed(letters))
 
     def point(self, values: list[float]) -> str:
         return self.add(f"IFCCARTESIANPOINT(({','.join(_real(v) for v in values)}))")
@@ -27,11 +38,11 @@ class _StepLines:
 
 def ifc_bytes(site: ExportSite) -> bytes:
     """Model in m; the site stands at the first head, so that far coordinates keep their digits."""
-    w = _StepLines()
+    w = _StepLines(f"{site.project}/{site.name}")
     origin = site.holes[0].axis[0].tolist()
     context, placed, project = _frame(w, site, origin)
     piles = [_pile(w, hole, origin, context, placed) for hole in site.holes]
-    inside = f"IFCRELCONTAINEDINSPATIALSTRUCTURE('{_guid('inside')}',$,$,$,({','.join(piles)}),{project})"
+    inside = f"IFCRELCONTAINEDINSPATIALSTRUCTURE('{w.guid('inside')}',$,$,$,({','.join(piles)}),{project})"
     w.add(inside)
     head = (
         "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION(('ViewDefinition [ReferenceView_V1.2]'),'2;1');\n"
@@ -50,14 +61,15 @@ def _frame(w: _StepLines, site: ExportSite, origin: list[float]) -> tuple[str, s
         for kind, name in (("LENGTHUNIT", "METRE"), ("PLANEANGLEUNIT", "RADIAN"))
     ]
     assigned = w.add(f"IFCUNITASSIGNMENT(({','.join(units)}))")
-    project = w.add(
-        f"IFCPROJECT('{_guid('project')}',$,'{_text(site.project or site.name)}',$,$,$,$,({context}),{assigned})"
-    )
+    named = _text((site.project or site.name)[:LABEL])
+    project = w.add(f"IFCPROJECT('{w.guid('project')}',$,'{named}',$,$,$,$,({context}),{assigned})")
     at = w.add(f"IFCAXIS2PLACEMENT3D({w.point(origin)},$,$)")
     placed = w.add(f"IFCLOCALPLACEMENT($,{at})")
     words = _text("; ".join((site.crs or "local coordinates", *site.remarks)))
-    found = w.add(f"IFCSITE('{_guid('site')}',$,'{_text(site.name)}','{words}',$,{placed},$,$,.ELEMENT.,$,$,$,$,$)")
-    w.add(f"IFCRELAGGREGATES('{_guid('aggregate')}',$,$,$,{project},({found}))")
+    found = w.add(
+        f"IFCSITE('{w.guid('site')}',$,'{_text(site.name[:LABEL])}','{words}',$,{placed},$,$,.ELEMENT.,$,$,$,$,$)"
+    )
+    w.add(f"IFCRELAGGREGATES('{w.guid('aggregate')}',$,$,$,{project},({found}))")
     return context, placed, found
 
 
@@ -69,9 +81,9 @@ def _pile(w: _StepLines, hole: ExportHole, origin: list[float], context: str, pl
     product = w.add(f"IFCPRODUCTDEFINITIONSHAPE($,$,({shape}))")
     at = w.add(f"IFCLOCALPLACEMENT({placed},{w.add(f'IFCAXIS2PLACEMENT3D({w.point([0.0, 0.0, 0.0])},$,$)')})")
     words = f"'{_text(hole.verdict)}'" if hole.verdict else "$"
-    name = _text(hole.name)
+    name = _text(hole.name[:LABEL])
     return w.add(
-        f"IFCPILE('{_guid('pile/' + hole.name)}',$,'{name}',{words},$,{at},{product},'{name}',.BORED.,.CAST_IN_PLACE.)"
+        f"IFCPILE('{w.guid('pile/' + hole.name)}',$,'{name}',{words},$,{at},{product},'{name}',.BORED.,.CAST_IN_PLACE.)"
     )
 
 
@@ -85,15 +97,11 @@ def _real(value: float) -> str:
 
 def _text(text: str) -> str:
     """A string of STEP: other letters as hexadecimal numbers."""
-    plain = text.replace("\\", "\\\\").replace("'", "''").replace("\n", " ")
-    return "".join(c if " " <= c <= "~" else f"\\X2\\{ord(c):04X}\\X0\\" for c in plain)
+    plain = text.replace("\\", "\\\\").replace("'", "''")
+    return "".join(c if " " <= c <= "~" else _other_letter(c) for c in plain)
 
 
-def _guid(name: str) -> str:
-    """Identifier of 22 letters, the same for the same name."""
-    number = uuid.uuid5(OWN, name).int
-    letters = []
-    for _ in range(22):
-        number, digit = divmod(number, 64)
-        letters.append(ALPHABET[digit])
-    return "".join(reversed(letters))
+def _other_letter(letter: str) -> str:
+    """A letter beyond ASCII in four hexadecimal digits, or in eight where they do not hold it."""
+    code = ord(letter)
+    return f"\\X2\\{code:04X}\\X0\\" if code < 0x10000 else f"\\X4\\{code:08X}\\X0\\"

@@ -48,4 +48,4 @@ def las_bytes(site: ExportSite) -> bytes:
 
 def _plain(text: str) -> str:
     """Text of a header line, which ends at a colon."""
-    return text.replace(":", " ").replace("\n", " ")
+    return text.replace(":", " ")

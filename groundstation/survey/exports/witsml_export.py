@@ -15,6 +15,8 @@ VARIANCES = (
     ("VarianceNN", 0, 0), ("VarianceNE", 0, 1), ("VarianceNVert", 0, 2), ("VarianceEE", 1, 1), ("VarianceEVert", 1, 2),
     ("VarianceVertVert", 2, 2),
 )  # fmt: skip
+TITLE, DESCRIPTION = 256, 2000  # letters, the longest that the schema allows
+MORE = " ... (more warnings in borechain survey)"
 OWN = uuid.UUID("6f0f2f43-3d57-5f5e-9d0e-6a2f5d3a8c11")  # of names of ours
 
 
@@ -32,28 +34,38 @@ def witsml_bytes(site: ExportSite) -> bytes:
     register_namespace("eml", E[1:-1])
     (hole,) = site.holes
     time = f"{site.day}T00:00:00Z"
-    root = Element(f"{W}Trajectory", {"schemaVersion": "2.1", "uuid": str(uuid.uuid5(OWN, f"trajectory/{hole.name}"))})
+    root = Element(f"{W}Trajectory", {"schemaVersion": "2.1", "uuid": _key("trajectory", site, hole.name)})
     citation = SubElement(root, f"{E}Citation")
     for name, text in (("Title", hole.name), ("Originator", "borechain"), ("Creation", time), ("Format", "borechain")):
-        SubElement(citation, f"{E}{name}").text = text
+        SubElement(citation, f"{E}{name}").text = text[:TITLE]
     if site.remarks:
-        SubElement(citation, f"{E}Description").text = "; ".join(site.remarks)
+        SubElement(citation, f"{E}Description").text = _short("; ".join(site.remarks))
     SubElement(root, f"{E}ActiveStatus").text = "inactive"
     index = SubElement(root, f"{E}Index")
     SubElement(index, f"{E}IndexKind").text = "measured depth"
-    _reference(SubElement(index, f"{E}IndexPropertyKind"), "eml23.PropertyKind", "measured depth")
+    _reference(SubElement(index, f"{E}IndexPropertyKind"), "eml23.PropertyKind", site, "measured depth")
     SubElement(index, f"{E}Uom").text = "m"
     SubElement(index, f"{E}Direction").text = "increasing"
-    _reference(SubElement(root, f"{W}Wellbore"), "witsml21.Wellbore", hole.name)
+    for k in range(len(hole.md)):  # the order of the schema: stations, their hole, their north
+        _station(root, hole, k, time)
+    _reference(SubElement(root, f"{W}Wellbore"), "witsml21.Wellbore", site, hole.name)
     if hole.north in NORTHS:
         SubElement(root, f"{W}AziRef").text = NORTHS[hole.north]
-    for k in range(len(hole.md)):
-        _station(root, hole, k, time)
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + bytes(tostring(root, encoding="utf-8")) + b"\n"
 
 
-def _reference(parent: Element, kind: str, title: str) -> None:
-    SubElement(parent, f"{E}Uuid").text = str(uuid.uuid5(OWN, f"{kind}/{title}"))
+def _key(kind: str, site: ExportSite, name: str) -> str:
+    """Identifier, the same for the same thing of the same site."""
+    return str(uuid.uuid5(OWN, "/".join((kind, site.project, site.name, name))))
+
+
+def _short(text: str) -> str:
+    """Text within the length that the schema allows a description; what is left out is said."""
+    return text if len(text) <= DESCRIPTION else f"{text[: DESCRIPTION - len(MORE)]}{MORE}"
+
+
+def _reference(parent: Element, kind: str, site: ExportSite, title: str) -> None:
+    SubElement(parent, f"{E}Uuid").text = _key(kind, site, title)
     SubElement(parent, f"{E}QualifiedType").text = kind
     SubElement(parent, f"{E}Title").text = title
 

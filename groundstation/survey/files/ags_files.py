@@ -1,7 +1,7 @@
 """AGS4: the group HORN, orientation and inclination of a hole, from the top of each interval on.
 
-An inclination of AGS counts from the horizontal, downwards. Source: Association of Geotechnical and Geoenvironmental
-Specialists, AGS 4.1.
+An inclination of AGS counts from the horizontal, downwards; a hole that rises has a negative one.
+Source: Association of Geotechnical and Geoenvironmental Specialists, AGS 4.1.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ EDITIONS = ("4.0", "4.0.3", "4.0.4", "4.1", "4.1.1", "4.2")
 NEEDED = {"LOCA_ID": "LOCA_ID", "HORN_TOP": "md", "HORN_ORNT": "azimuth", "HORN_INCL": "dip"}
 
 
-def read_ags(path: Path, content: bytes) -> FieldTable:
+def read_ags(path: Path, content: bytes) -> list[FieldTable]:
     """Table of the group HORN.
 
     Raises
@@ -40,7 +40,7 @@ def read_ags(path: Path, content: bytes) -> FieldTable:
     names = [(NEEDED[heading[p]], units[p] if p < len(units) else "") for p in places]
     header = [f"{name} ({unit})" if unit else name for name, unit in names]
     cells = [[row[p] if p < len(row) else "" for p in places] for row in rows]
-    return FieldTable(f"AGS {edition}, group HORN", header, cells, lines)
+    return [FieldTable(f"AGS {edition}, group HORN", header, cells, lines, dips_go_up=True)]
 
 
 def _groups(path: Path, text: str) -> dict[str, list[tuple[int, list[str]]]]:
@@ -51,6 +51,8 @@ def _groups(path: Path, text: str) -> dict[str, list[tuple[int, list[str]]]]:
         for row in reader:
             if row[:1] == ["GROUP"]:
                 name = row[1] if len(row) > 1 else ""
+                if name in found:
+                    raise SurveyError(f"{path}: line {reader.line_num}: the group {name} stands there twice")
                 found[name] = []
             elif row and name:
                 found[name].append((reader.line_num, row))

@@ -10,16 +10,18 @@ from groundstation.survey.files.ags_files import read_ags
 from groundstation.survey.files.field_table import FieldTable, TableWish
 from groundstation.survey.files.file_bytes import decode_text, read_file
 from groundstation.survey.files.las_files import read_las
+from groundstation.survey.files.several_tables import choose_table
 from groundstation.survey.files.station_tables import Understood, extent_words, understand_table
-from groundstation.survey.files.survey_columns import is_survey_header
+from groundstation.survey.files.survey_columns import is_survey_header, unknown_unit
 from groundstation.survey.files.survey_records import DISPLACEMENTS, DisplacementRule, read_record
 from groundstation.survey.files.text_tables import find_table
+from groundstation.survey.files.unit_rows import with_unit_row
 from groundstation.survey.files.xlsx_files import read_xlsx
 from groundstation.survey.files.xml_surveys import read_xml
 
 NO_WISH = TableWish()
 OLD_XLS = b"\xd0\xcf\x11\xe0"
-READERS: dict[str, Callable[[Path, bytes], FieldTable]] = {
+READERS: dict[str, Callable[[Path, bytes], list[FieldTable]]] = {
     "las": read_las, "xlsx": read_xlsx, "xml": read_xml, "ags": read_ags,
 }  # fmt: skip
 
@@ -48,11 +50,13 @@ def read_any(path: Path, rule: DisplacementRule = DisplacementRule.EXACT, wish: 
 
         return understand_table(path, read_edm(path, content), wish)
     if form:
-        return understand_table(path, READERS[form](path, content), wish)
+        return understand_table(path, *choose_table(path, READERS[form](path, content), wish))
     table = find_table(path, decode_text(path, content), is_known_header)
     if set(DISPLACEMENTS) <= {cell.strip() for cell in table.header} and table.plain:
         record = read_record(path, rule)
         return Understood(record, f"read as: MD m, displacements, cm; {extent_words(record)}")
+    if not is_known_header(table.header) and (column := unknown_unit(table.header)) is not None:
+        with_unit_row(path, table, [column])  # says which unit is not known
     if not is_known_header(table.header) and path != Path("-"):
         read_record(path, rule)  # says which columns a table of ours has
     return understand_table(path, _with_frame(table), wish)

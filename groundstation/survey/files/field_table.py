@@ -14,6 +14,8 @@ class FieldTable:
     form : how it is written, for people, such as ``separated by ';'`` or ``LAS 2.0``
     numbers_as_text : whether its numbers were written by people, who may write a decimal comma
     said : what the file says of itself beyond its columns, by name: ``north``, ``depth_reference``
+    name : of this table where a file may hold several, such as that of a sheet
+    dips_go_up : whether its format has dips above the horizontal, as negative ones
     """
 
     form: str
@@ -24,6 +26,8 @@ class FieldTable:
     numbers_as_text: bool = False
     plain: bool = False  # commas, no quotes: the program's own tables
     said: dict[str, str] = field(default_factory=dict)
+    name: str = ""
+    dips_go_up: bool = False
 
 
 @dataclass(frozen=True, slots=True)

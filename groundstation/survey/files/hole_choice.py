@@ -17,7 +17,12 @@ REMARKS = (
     "comment", "comments", "remark", "remarks", "note", "notes", "bemerkung", "description", "date", "time", "datetime",
     "date time", "datum", "zeit", "utc", "timestamp",
 )  # fmt: skip  # of a station, not of a hole
-NUMBERED = ("hole", "well", "bore", "borehole", "wellbore", "column", "pile", "hole id", "loca id", "uwi", "bohrung")
+NUMBERED = (
+    "hole", "holeid", "bhid", "bh", "dhid", "drillhole", "drill hole", "borehole", "boreholeid", "bore", "well",
+    "wellid", "wellbore", "uwi", "api", "column", "pile", "loca", "location", "sidetrack", "bohrung", "bohrloch",
+    "pfahl", "sondage", "forage", "sondaggio", "pozzo", "pozo",
+)  # fmt: skip  # names of columns that tell holes apart, by numbers too
+OF_NAMES = ("id", "no", "nr", "nbr", "num", "number", "name", "nummer", "numero")  # words beside them
 ALL = "*"
 SHOWN = 6
 
@@ -76,9 +81,15 @@ def _names(table: FieldTable, place: int) -> list[str]:
     if title in REMARKS:
         return []
     cells = list(dict.fromkeys(row[place] for row in table.rows if row[place]))
-    if title in NUMBERED:
+    if _tells_holes(title):
         return cells
     return cells if any(not _is_number(cell) for cell in cells) else []
+
+
+def _tells_holes(title: str) -> bool:
+    """Whether a column is that of holes by its name: ``Hole No.``, ``BHID``, ``well_name``; not ``hole size``."""
+    words = [word for word in title.replace(".", " ").replace("#", " ").split() if word not in OF_NAMES]
+    return " ".join(words) in NUMBERED
 
 
 def _is_number(cell: str) -> bool:

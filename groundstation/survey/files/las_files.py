@@ -20,8 +20,8 @@ DELIMITERS = {"COMMA": ",", "TAB": "\t"}
 Lines = list[tuple[int, str]]
 
 
-def read_las(path: Path, content: bytes) -> FieldTable:
-    """Table of the first section whose columns are those of a survey.
+def read_las(path: Path, content: bytes) -> list[FieldTable]:
+    """Tables of all sections whose columns are those of a survey.
 
     Raises
     ------
@@ -35,13 +35,16 @@ def read_las(path: Path, content: bytes) -> FieldTable:
     null = _value(sections, "W", "NULL")
     delimiter = DELIMITERS.get(_value(sections, "V", "DLM").upper(), " ")
     wrapped = _value(sections, "V", "WRAP").upper().startswith("Y")
-    for definition, data in _pairs(sections):
+    found = []
+    for title, definition, data in _pairs(sections):
         header = [_column(line) for _, line in definition]
         if is_survey_header(header):
             rows, lines = _rows(path, data, len(header), delimiter, wrapped)
             cells = [["" if _is_same(cell, null) else cell for cell in row] for row in rows]
-            return FieldTable(f"LAS {version}", header, cells, lines)
-    raise SurveyError(f"{path}: LAS {version}: expected curves of depth, inclination and azimuth")
+            found.append(FieldTable(f"LAS {version}", header, cells, lines, name=title))
+    if not found:
+        raise SurveyError(f"{path}: LAS {version}: expected curves of depth, inclination and azimuth")
+    return found
 
 
 def _sections(text: str) -> list[tuple[str, Lines]]:
@@ -56,32 +59,39 @@ def _sections(text: str) -> list[tuple[str, Lines]]:
 
 
 def _value(sections: list[tuple[str, Lines]], letter: str, name: str) -> str:
+    """First word of a header line, which ends at its colon."""
     for title, lines in sections:
         if title.upper().startswith(letter):
             for _, line in lines:
                 match = LINE.match(line)
                 if match and match[1].strip().upper() == name:
-                    return f"{match[2]} {match[3].rpartition(':')[0]}".strip()
+                    words = f"{match[2]} {match[3]}".partition(":")[0].split()
+                    return words[0] if words else ""
     return ""
 
 
-def _pairs(sections: list[tuple[str, Lines]]) -> list[tuple[Lines, Lines]]:
-    """Definitions of columns with their data."""
-    named = {title.split("|")[0].strip().split()[0].lower(): lines for title, lines in sections if title.strip()}
+def _pairs(sections: list[tuple[str, Lines]]) -> list[tuple[str, Lines, Lines]]:
+    """Data by their titles, with the definitions of their columns before them."""
+    named = {_title(title).lower(): lines for title, lines in sections}
     found = []
     for title, lines in sections:
         if "|" in title:
-            definition = title.split("|")[1].strip().lower()
-            found.append((named.get(definition, []), lines))
+            found.append((_title(title), named.get(title.split("|")[1].strip().lower(), []), lines))
         elif title.upper().startswith("A"):
             curves = [x for t, x in sections if t.upper().startswith("C") or t.lower().startswith("log_definition")]
-            found += [(curve, lines) for curve in curves[:1]]
+            found += [("log", curve, lines) for curve in curves[:1]]
     return found
+
+
+def _title(title: str) -> str:
+    """First word of a section's title, before the bar that names its definition."""
+    words = title.partition("|")[0].split()
+    return words[0] if words else ""
 
 
 def _column(line: str) -> str:
     match = LINE.match(line)
-    name, unit = (match[1].strip(), match[2]) if match else (line, "")
+    name, unit = (match[1].strip(), match[2].partition(":")[0]) if match else (line, "")
     return f"{name} ({unit})" if unit else name
 
 
@@ -93,15 +103,18 @@ def _rows(path: Path, data: Lines, width: int, delimiter: str, wrapped: bool) ->
     elif delimiter == " ":
         rows = [(number, line.split()) for number, line in data]
     else:
-        rows = [
-            (number, [c.strip() for c in row])
-            for number, line in data
-            for row in csv.reader([line], delimiter=delimiter)
-        ]
+        rows = [(number, [cell.strip() for cell in _cells(path, number, line, delimiter)]) for number, line in data]
     for number, row in rows:
         if len(row) != width:
             raise SurveyError(f"{path}: line {number}: expected {width} values, got {len(row)}")
     return [row for _, row in rows], [number for number, _ in rows]
+
+
+def _cells(path: Path, number: int, line: str, delimiter: str) -> list[str]:
+    try:
+        return next(csv.reader([line], delimiter=delimiter))
+    except csv.Error as error:
+        raise SurveyError(f"{path}: line {number}: expected values of LAS: {error}") from None
 
 
 def _is_same(cell: str, null: str) -> bool:

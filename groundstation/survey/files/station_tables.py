@@ -16,17 +16,18 @@ from groundstation.entry.entry_warning import EntryWarning
 from groundstation.entry.null_values import is_null
 from groundstation.errors import SurveyError
 from groundstation.survey.files.cell_numbers import cell_numbers, decimal_sign
+from groundstation.survey.files.dip_columns import inclinations_of_dips
 from groundstation.survey.files.field_table import FieldTable, TableWish
 from groundstation.survey.files.hole_choice import choose_hole
 from groundstation.survey.files.instrument_columns import instrument_column
 from groundstation.survey.files.survey_columns import (
     ALLOWED,
     TO_SI,
-    UNITS,
     NamedColumn,
     named_columns,
 )
 from groundstation.survey.files.survey_records import STATIONS, stations_of
+from groundstation.survey.files.unit_rows import with_unit_row
 from groundstation.survey.well.analysis import RECORD_COLUMNS
 from groundstation.survey.well.well_record import SurveyRecord
 
@@ -52,7 +53,7 @@ def understand_table(path: Path, table: FieldTable, wish: TableWish) -> Understo
     SurveyError
         Names file, line and column: what was expected and what came.
     """
-    table, columns = _with_unit_row(path, table, named_columns(table.header))
+    table, columns = with_unit_row(path, table, named_columns(table.header))
     columns = _settled(path, table, columns, wish)
     table, warnings = choose_hole(path, table, {column.place for column in columns}, wish)
     cells = [row[column.place] for column in columns for row in table.rows]
@@ -69,7 +70,8 @@ def understand_table(path: Path, table: FieldTable, wish: TableWish) -> Understo
         for name, c in zip(STATIONS, columns, strict=True)
     }
     if columns[1].quantity == "dip":
-        numbers[STATIONS[1]] = _of_dip(path, table.header[columns[1].place], numbers[STATIONS[1]])
+        name = table.header[columns[1].place]
+        numbers[STATIONS[1]] = inclinations_of_dips(path, name, numbers[STATIONS[1]], lines, signed=table.dips_go_up)
     numbers |= _other_columns(path, table, columns, kept, decimal)
     record = replace(stations_of(path, numbers, lines, wish.fewest), warnings=(*warnings, *missing))
     north = columns[2].north or table.said.get("north", "")
@@ -78,46 +80,6 @@ def understand_table(path: Path, table: FieldTable, wish: TableWish) -> Understo
 
 def _number(value: float | None) -> float:
     return 0.0 if value is None else value
-
-
-def _with_unit_row(path: Path, table: FieldTable, columns: list[NamedColumn]) -> tuple[FieldTable, list[NamedColumn]]:
-    """Columns with the units of a first row where that holds units instead of numbers."""
-    for column in columns:
-        if column.unknown:
-            name = table.header[column.place]
-            raise SurveyError(f"{path}: {name}: unknown unit {column.unknown!r}; expected one of {_units(column)}")
-    if not table.rows or not columns:
-        return table, columns
-    first = [cell.strip("()[] ").lower() for cell in table.rows[0]]
-    told = [first[column.place] for column in columns]
-    if not any(unit in UNITS for unit in told) or any(_is_number(unit) for unit in told):
-        return table, columns
-    filled = []
-    for column, text in zip(columns, told, strict=True):
-        unit = UNITS.get(text, "")
-        if text and not unit:
-            name = table.header[column.place]
-            raise SurveyError(
-                f"{path}: line {table.lines[0]}: {name}: unknown unit {text!r}; expected one of {_units(column)}"
-            )
-        if column.stated and unit and unit != column.unit:
-            raise SurveyError(
-                f"{path}: line {table.lines[0]}: {unit} under a header in {column.unit}; expected one unit"
-            )
-        filled.append(replace(column, unit=unit or column.unit, stated=column.stated or bool(unit)))
-    return replace(table, rows=table.rows[1:], lines=table.lines[1:]), filled
-
-
-def _units(column: NamedColumn) -> str:
-    return ", ".join(ALLOWED[column.quantity])
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _settled(path: Path, table: FieldTable, columns: list[NamedColumn], wish: TableWish) -> list[NamedColumn]:
@@ -201,13 +163,6 @@ def _without_missing(
         where = None if depth is None else depth * TO_SI[columns[0].unit]
         warnings.append(EntryWarning("missing", title, text, where, where))
     return kept, warnings
-
-
-def _of_dip(path: Path, name: str, dip_deg: Array) -> Array:
-    """Inclinations (deg) of dips, which count from the horizontal, down as one sign of them."""
-    if np.any(dip_deg > 0.0) and np.any(dip_deg < 0.0):
-        raise SurveyError(f"{path}: {name}: expected dips of one sign, got {dip_deg.min():g} and {dip_deg.max():g} deg")
-    return np.asarray(90.0 - np.abs(dip_deg))
 
 
 def _other_columns(

@@ -22,8 +22,8 @@ UNITS = {
     "m": "m", "meter": "m", "meters": "m", "metre": "m", "metres": "m", "cm": "cm", "mm": "mm", "ft": "ft",
     "feet": "ft", "foot": "ft", "f": "ft", "usft": "usft", "ftus": "usft", "us-ft": "usft", "deg": "deg", "dega": "deg",
     "degree": "deg", "degrees": "deg", "°": "deg", "rad": "rad", "radians": "rad", "gon": "gon", "gons": "gon",
-    "grad": "gon", "grads": "gon",
-}  # fmt: skip
+    "grads": "gon",
+}  # fmt: skip  # a "grad" is a gon in English and a degree in German: it is asked for
 TO_SI = {
     "m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "usft": 1200.0 / 3937.0,
     "deg": 1.0, "rad": math.degrees(1.0), "gon": 0.9,
@@ -71,6 +71,18 @@ def _named(cell: str, place: int) -> NamedColumn | None:
     if quantity is None or (north and quantity != "azimuth"):
         return None
     return NamedColumn(quantity, place, unit or ASSUMED[quantity], bool(unit), north, unknown)
+
+
+def unknown_unit(cells: list[str]) -> NamedColumn | None:
+    """The first column that has a name of ours and a unit that is not known, where a quantity is missing by it."""
+    have = {column.quantity for column in named_columns(cells)}
+    for place, cell in enumerate(cells):
+        words = _words(cell)
+        for count in range(len(words) - 1, 0, -1):
+            quantity = QUANTITIES.get(" ".join(words[:count]))
+            if quantity is not None and quantity not in have:
+                return NamedColumn(quantity, place, "", False, unknown=" ".join(words[count:]))
+    return None
 
 
 def _words(cell: str) -> list[str]:

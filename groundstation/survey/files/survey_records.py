@@ -177,9 +177,9 @@ def stations_of(path: Path, table: dict[str, Array], lines: list[int], fewest: i
     if len(outside):
         k = int(outside[0])
         raise SurveyError(f"{path}: line {lines[k]}: expected an inclination of 0..180 deg, got {inclination_deg[k]:g}")
-    turned = np.flatnonzero(np.abs(azimuth_deg) > RANGES["azimuth_deg"].high)
-    if len(turned):
-        RANGES["azimuth_deg"].check(f"{path}: line {lines[int(turned[0])]}: azimuth_deg", float(azimuth_deg[turned[0]]))
+    for name, key, values in (("md_m", "depth", md), ("azimuth_deg", "azimuth_deg", azimuth_deg)):
+        for k in np.flatnonzero(np.abs(values) > RANGES[key].high)[:1].tolist():
+            RANGES[key].check(f"{path}: line {lines[k]}: {name}", float(values[k]))
     _check(path, md, lines, fewest)
     return SurveyRecord(md, np.radians(inclination_deg), np.radians(azimuth_deg), lines, _others(table, STATIONS))
 

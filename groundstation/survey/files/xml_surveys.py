@@ -19,8 +19,8 @@ HEADER = ("hole", "md", "incl", "azi")
 NORTHS = {"true north": "true", "grid north": "grid", "magnetic north": "magnetic"}
 
 
-def read_xml(path: Path, content: bytes) -> FieldTable:
-    """Table of a trajectory.
+def read_xml(path: Path, content: bytes) -> list[FieldTable]:
+    """Table of trajectories, or tables of all results of a document of DIGGS.
 
     Raises
     ------
@@ -31,14 +31,17 @@ def read_xml(path: Path, content: bytes) -> FieldTable:
     space, name = _parts(root)
     if space == SERIES_1 and name == "trajectorys":
         holes = [x for x in root if _parts(x)[1] == "trajectory"]
-        return _witsml(path, holes, "1.4.1.1", root.get("version", ""))
+        return [_witsml(path, holes, "1.4.1.1", root.get("version", ""))]
     if space == SERIES_2 and name == "Trajectory":
-        return _witsml(path, [root], "2.1", root.get("schemaVersion", ""))
+        return [_witsml(path, [root], "2.1", root.get("schemaVersion", ""))]
     if space.startswith(DIGGS):
         from groundstation.survey.files.diggs_files import read_diggs
 
         return read_diggs(path, root)
-    raise SurveyError(f"{path}: {name} of {space or 'no namespace'}: expected a WITSML trajectory or DIGGS")
+    raise SurveyError(
+        f"{path}: {name} of {space or 'no namespace'}: "
+        "expected a WITSML trajectory, 1.4.1.1 or 2.1, or DIGGS 2.6 or 3.0"
+    )
 
 
 def parse_xml(path: Path, content: bytes) -> Element:
@@ -69,8 +72,8 @@ def _witsml(path: Path, holes: list[Element], known: str, version: str) -> Field
     rows: list[list[str]] = []
     units: dict[str, str] = {}
     norths = set()
-    for hole in holes:
-        named = hole.get("nameWellbore") or _text(hole, "nameWellbore") or _text(hole, "Title") or _text(hole, "name")
+    names = _names(holes)
+    for hole, named in zip(holes, names, strict=True):
         norths.add(NORTHS.get(_text(hole, "aziref"), ""))
         for station in (x for x in hole if _parts(x)[1].lower() == "trajectorystation"):
             rows.append([named, *(_measure(path, station, quantity, units) for quantity in HEADER[1:])])
@@ -81,6 +84,19 @@ def _witsml(path: Path, holes: list[Element], known: str, version: str) -> Field
     said = {"north": north} if north else {}
     lines = list(range(1, len(rows) + 1))
     return FieldTable(f"WITSML {known}, stations in order", header, rows, lines, said=said)
+
+
+def _names(holes: list[Element]) -> list[str]:
+    """Names of trajectories, that of the hole where each has one of its own: two of one hole are two surveys of it."""
+    wells = [hole.get("nameWellbore") or _text(hole, "nameWellbore") for hole in holes]
+    own = [_text(hole, "name") or hole.get("uid", "") for hole in holes]
+    if len(holes) == 1:
+        title = next((_text(part, "Title") for part in holes[0] if _parts(part)[1] == "Citation"), "")
+        return [wells[0] or title or own[0]]
+    return [
+        well if well and wells.count(well) == 1 else " / ".join(filter(None, (well, name))) or str(number)
+        for number, (well, name) in enumerate(zip(wells, own, strict=True), 1)
+    ]
 
 
 def _measure(path: Path, station: Element, quantity: str, units: dict[str, str]) -> str:

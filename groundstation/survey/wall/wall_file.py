@@ -299,13 +299,14 @@ def _value(path: Path, key: str, value: Any) -> Any:
 def read_wall(path: Path) -> Wall:
     """The whole wall; errors as ``read_wall_file``, of its CSV files with their line."""
     file = read_wall_file(path)
-    rows = read_heads(file.heads, file.defaults)
+    rows = read_heads(file.heads, file.defaults, file.north)
     if not rows:
         raise SurveyError(f"{file.heads}: expected at least two columns next to each other, got none")
     courses = dict.fromkeys([*file.courses, *(row.course for row in rows if row.course is not None)])
     file = replace(file, courses=tuple(courses))
     names = [row.name for row in rows]
-    surveys = read_holes(file.stations, [row.plan_without_length for row in rows], [row.depths.height for row in rows])
+    designed, heights = [row.plan_without_length for row in rows], [row.depths.height for row in rows]
+    surveys = read_holes(file.stations, designed, heights, file.stations_north)
     holes = [hole.turned(file.stations_turn) for hole in surveys]
     length = file.length or max((float(hole.md[-1]) for hole in holes if len(hole.md)), default=0.0)
     if not length and any(row.length is None for row in rows):  # of a plan it is known

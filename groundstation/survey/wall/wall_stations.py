@@ -27,13 +27,13 @@ PLACES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # of these in a covar
 ROUNDED = 1e-6  # of a trace, to which a covariance may be rounded in a file
 
 
-def read_holes(path: Path, plans: Sequence[ColumnPlan], heights: list[float]) -> list[ColumnSurvey]:
+def read_holes(path: Path, plans: Sequence[ColumnPlan], heights: list[float], north: str) -> list[ColumnSurvey]:
     """Stations of every column in the order of ``plans``; none of one that was not surveyed.
 
     Depths of a column are brought to its head by ``heights`` (m), how far what they count from lies above it. A station
     at 0 m there tells the direction at the head, for between the two the string is straight. Further columns, those of
     ``RECORD_COLUMNS``, go with the stations where the instrument asks for them; those of ``COVARIANCE`` say how well
-    each station is known, and no instrument is asked then.
+    each station is known, and no instrument is asked then. Azimuths count from ``north``.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def read_holes(path: Path, plans: Sequence[ColumnPlan], heights: list[float]) ->
         Names file, line and column.
     """
     needed = ("column", "md_m", "inclination_deg", "azimuth_deg")
-    table, lines = read_table_columns(path, needed, texts=("column", *RECORD_COLUMNS, *COVARIANCE))
+    table, lines = read_table_columns(path, needed, texts=("column", *RECORD_COLUMNS, *COVARIANCE), north=north)
     table, lines, missing = _without_missing(table, lines, needed[1:])
     names = [plan.design.name for plan in plans]
     index = {name: k for k, name in enumerate(names)}

@@ -18,6 +18,7 @@ from groundstation.entry.null_values import is_null
 from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
 from groundstation.survey.files.column_tables import read_table_columns
+from groundstation.survey.files.survey_columns import UNITS
 from groundstation.survey.tools.instruments import SurveyTool, load_tool
 from groundstation.survey.wall.column_deviation import ColumnDesign, Tolerance, parse_tolerance
 from groundstation.survey.wall.column_plans import ColumnPlan, ColumnStatus
@@ -31,6 +32,7 @@ NUMBERS = (
     "down_m", "inclination_deg", "azimuth_deg", "length_m", "radius_m", "drilled_to_m", "head_sigma_m",
     "depth_reference_height_m",
 )  # fmt: skip
+NEEDED = ("column", "north_m", "east_m")
 SIGNED = ("down_m", "azimuth_deg", "depth_reference_height_m")  # may be negative
 WORDS = ("state", "instrument", "serial", "calibration", "tolerance", "between", "replaces", "drilled_on", "plan")
 STRAIGHT = ("inclination_deg", "azimuth_deg", "length_m")  # of an axis without a plan
@@ -93,15 +95,16 @@ class HeadRow:
         return replace(known, design=replace(known.design, length=self.length or length))
 
 
-def read_heads(path: Path, defaults: Defaults) -> list[HeadRow]:
-    """Columns of a wall in the order of the file.
+def read_heads(path: Path, defaults: Defaults, north: str) -> list[HeadRow]:
+    """Columns of a wall in the order of the file; azimuths count from ``north``.
 
     Raises
     ------
     SurveyError, ToolError
         Names file, line and column.
     """
-    table, lines = read_table_columns(path, ("column", "north_m", "east_m"), texts=("column", *NUMBERS, *WORDS))
+    table, lines = read_table_columns(path, NEEDED, texts=("column", *NUMBERS, *WORDS), north=north)
+    _check_units(path, [name for name in table if name not in (*NEEDED, *NUMBERS, *WORDS)])
     names = [str(name) for name in table["column"]]
     seen: dict[str, int] = {}
     for line, name in zip(lines, names, strict=True):
@@ -123,6 +126,16 @@ def read_heads(path: Path, defaults: Defaults) -> list[HeadRow]:
         cells = {key: str(table[key][k]) for key in (*NUMBERS, *WORDS) if key in table}
         rows.append(_head(f"{path}: line {line}: column {name}", name, heads[k], cells, defaults, tools, courses))
     return rows
+
+
+def _check_units(path: Path, others: list[str]) -> None:
+    """Refuse a column that would be ours in another unit, or without one: what it says would not be heard."""
+    for other in others:
+        for name in NUMBERS:
+            stem = name.rpartition("_")[0]
+            rest = other.lower().removeprefix(stem).strip(" _()[]")
+            if other.lower().startswith(stem) and (not rest or rest in UNITS):
+                raise SurveyError(f"{path}: {other}: expected {name}")
 
 
 def _head(

@@ -136,7 +136,7 @@ def test_of_two_norths_the_one_that_is_chosen_is_taken_and_one_says_itself(tmp_p
         ("a.xml", witsml_2("2.0"), "WITSML 2.0: expected version 2.1"),
         ("a.xml", witsml_1().replace(b'"1.4.1.1"', b'"1.3.1.1"'), "WITSML 1.3.1.1: expected version 1.4.1.1"),
         ("a.xml", witsml_1().replace(b'<md uom="m">10', b'<md uom="ft">10'), "md in m and in ft; expected one unit"),
-        ("a.xml", b"<kml xmlns='http://x'/>", "kml of http://x: expected a WITSML trajectory or DIGGS"),
+        ("a.xml", b"<kml xmlns='http://x'/>", "kml of http://x: expected a WITSML trajectory, 1.4.1.1 or 2.1, or"),
         ("a.xml", witsml_2()[:300], "not XML"),
         ("a.xml", diggs().replace(b"5.0,130.0", b"5.0"), "DIGGS: expected 2 values at each of 4 depths"),
         ("a.ags", ags().replace(b"4.1.1", b"3.1"), "AGS 3.1: expected one of 4.0"),

@@ -14,7 +14,7 @@ from groundstation.errors import SurveyError
 from groundstation.service.hole.hole_depths import HoleDepths
 from groundstation.service.hole.position_sources import _of_directions, depth_variance_at_toe, take_undone
 from groundstation.survey.exports.export_hole import ExportHole, ExportSite
-from groundstation.survey.exports.ifc_export import _guid, _text, ifc_bytes
+from groundstation.survey.exports.ifc_export import _StepLines, _text, ifc_bytes
 from groundstation.survey.exports.las_export import las_bytes
 from groundstation.survey.files.cell_numbers import cell_numbers, decimal_sign, plain_cell
 from groundstation.survey.files.field_table import FieldTable, TableWish
@@ -127,7 +127,7 @@ AZIM.DEG : azimuth
 
 @pytest.mark.parametrize(("wrap", "rows"), [("NO", "0 1 2\n5 -99.0 2\n10 3 4"), ("YES", "0\n1 2\n5 -99.0\n2 10 3\n4")])
 def test_a_log_is_read_row_by_row_and_what_is_null_is_empty(wrap: str, rows: str) -> None:
-    found = read_las(Path("a.las"), LAS.format(wrap=wrap, rows=rows).encode())
+    (found,) = read_las(Path("a.las"), LAS.format(wrap=wrap, rows=rows).encode())
     assert found.header == ["DEPT (M)", "INCL (DEG)", "AZIM (DEG)"]
     assert found.rows == [["0", "1", "2"], ["5", "", "2"], ["10", "3", "4"]]
     with pytest.raises(SurveyError, match=r"expected 3 values, got [25]"):
@@ -163,10 +163,10 @@ def test_a_model_has_its_points_from_the_first_head_and_names_of_twenty_two_lett
     assert text.count("IFCCARTESIANPOINT((1.0,1.0,-1.0))") == 2
     assert [word for word in (",0.6,$,$,$)", ",0.05,$,$,$)") if word in text] == [",0.6,$,$,$)", ",0.05,$,$,$)"]
     assert "'H''1'" in text
-    assert _text("é'\\\n") == "\\X2\\00E9\\X0\\''\\\\ "
-    names = {_guid(name) for name in ("a", "b", "site", "pile/A")}
+    assert _text("é'\\🛠") == "\\X2\\00E9\\X0\\''\\\\\\X4\\0001F6E0\\X0\\"
+    names = {_StepLines(project).guid(name) for project in ("p", "q") for name in ("a", "b", "site", "pile/A")}
     assert {len(name) for name in names} == {22}
-    assert len(names) == 4
+    assert len(names) == 8  # two projects that are put together share none
     assert {name[0] for name in names} <= set("0123")  # 128 bits are two and 21 times six
 
 
