@@ -27,10 +27,10 @@ class StandInError(ImportError):
     """Numba is in the process already."""
 
 
-def njit(function: Any = None, **_: Any) -> Any:
+def run_as_python(function: Any = None, **_: Any) -> Any:
     """Run a kernel as Python, which sees records as numba shows them."""
     if function is None:
-        return njit
+        return run_as_python
 
     @functools.wraps(function)
     def run(*given: Any, **named: Any) -> Any:
@@ -69,7 +69,7 @@ def stand_in_modules() -> dict[str, dict[str, Any]]:
         "numba": {
             "__version__": VERSION,
             "config": config,
-            "njit": njit,
+            "njit": run_as_python,
             "types": SimpleNamespace(**kinds),
             "typeof": type,
         },
@@ -80,6 +80,8 @@ def stand_in_modules() -> dict[str, dict[str, Any]]:
         "numba.core.types": kinds,
         "numba.core.typing.typeof": {"Purpose": _Purpose},
         "numba.extending": extending | {"models": SimpleNamespace(OpaqueModel=object), "typeof_impl": registry},
+        "numba.np": {},
+        "numba.np.arraymath": {},
         "llvmlite": {},
         "llvmlite.binding": {"get_host_cpu_name": platform.machine},
     }
