@@ -67,8 +67,8 @@ class ChipSide:
         self._kept.append(content)
         assert self._library.link_send(self._state, content, len(payload))
 
-    def say(self, identifier: int, data: bytes) -> None:
-        self._library.chip_end_say(self._state, identifier, data, len(data))
+    def say(self, identifier: int, data: bytes, topic: int = 0) -> None:
+        self._library.chip_end_say(self._state, identifier, topic, data, len(data))
 
     def next_frame(self, now_ms: int) -> tuple[int, bytes] | None:
         identifier, data = ctypes.c_uint32(), (ctypes.c_uint8 * 72)()
