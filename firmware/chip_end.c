@@ -118,7 +118,9 @@ static void on_tunnel(struct chip_end *end, uint32_t priority, const uint8_t *da
     end->priorities[which] = (uint8_t)priority;
     answer = isotp_on_frame(receiver, data, length, now_ms);
     if (answer == ISOTP_WHOLE) {
-        if (link_receive(&end->link, receiver->room, receiver->length, now_ms, deliver, end) != LINK_TAKEN) {
+        const bool has_room = end->calls.has_room == NULL || end->calls.has_room(end->calls.own);
+        if (link_receive(&end->link, receiver->room, receiver->length, now_ms, has_room ? deliver : NULL, end) !=
+            LINK_TAKEN) {
             end->wrong++;
         }
     } else if (answer != ISOTP_NOTHING) {

@@ -23,6 +23,7 @@ struct chip_end_calls {
     void *own;
     void (*on_payload)(void *own, const uint8_t *payload, uint32_t length);          /* by the link, once */
     void (*on_signals)(void *own, int type, const union native_message *heard);
+    bool (*has_room)(void *own); /* for a payload; NULL: always. One for which there is none comes again */
 };
 
 /* Signals that wait: a newer message of the same topic takes their place. */

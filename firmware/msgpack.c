@@ -49,9 +49,18 @@ void pack_integer(struct pack_writer *to, int64_t value)
     }
 }
 
+static uint32_t length_of(const char *text)
+{
+    uint32_t length = 0u;
+    while (text[length] != '\0') {
+        length++;
+    }
+    return length;
+}
+
 void pack_text(struct pack_writer *to, const char *text)
 {
-    const uint32_t length = (uint32_t)strlen(text);
+    const uint32_t length = length_of(text);
     uint32_t k;
     if (length < 32u) {
         put(to, 0xA0u | length, 1u);
@@ -284,5 +293,5 @@ bool read_past(struct pack_reader *from)
 
 bool text_is(const uint8_t *text, uint32_t length, const char *wanted)
 {
-    return length == (uint32_t)strlen(wanted) && memcmp(text, wanted, length) == 0;
+    return length == length_of(wanted) && memcmp(text, wanted, length) == 0;
 }

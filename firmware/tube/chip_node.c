@@ -239,6 +239,28 @@ static bool pass_on(struct chip_node *node, enum node_side to, const uint8_t *pa
     return false;
 }
 
+static bool has_room(const struct chip_node *node, enum node_side to)
+{
+    uint32_t k;
+    for (k = 0u; k < NODE_RELAYS; k++) {
+        const struct node_relay *const one = &node->relays[k];
+        if (one->length == 0u || !link_holds(&node->ends[one->side].link, one->payload)) {
+            return node->ends[to].link.count < LINK_SLOTS;
+        }
+    }
+    return false;
+}
+
+static bool has_room_below(void *own)
+{
+    return has_room(own, NODE_LOWER);
+}
+
+static bool has_room_above(void *own)
+{
+    return has_room(own, NODE_UPPER);
+}
+
 static struct node_answer *answer_of(struct chip_node *node, int64_t order)
 {
     uint32_t k;
@@ -444,8 +466,8 @@ bool node_begin(
     uint32_t nonce,
     int64_t now_us)
 {
-    const struct chip_end_calls upper = {node, on_upper_payload, on_upper_signals};
-    const struct chip_end_calls lower = {node, on_lower_payload, on_lower_signals};
+    const struct chip_end_calls upper = {node, on_upper_payload, on_upper_signals, has_room_below};
+    const struct chip_end_calls lower = {node, on_lower_payload, on_lower_signals, has_room_above};
     memset(node, 0, sizeof *node);
     node->identity = *identity;
     node->flash = flash;

@@ -12,7 +12,7 @@ import tty
 from pathlib import Path
 
 from node.firmware.event_words import EVENTS_HEADER, write_event_table
-from node.firmware.node_image import IMAGE, provision_node
+from node.firmware.node_image import IMAGE, LOADER, LOADER_TEXT, provision_node
 from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import default_config
@@ -42,9 +42,13 @@ def build_tube(folder: Path) -> Path:
     """The program of a tube for QEMU's mps2-an386, from the sources of the product, linked for 192 kB and 32 kB."""
     build_firmware(FirmwareRequest("c", 1, folder))
     codec = write_native_codec()
-    for name, text in ((NATIVE_HEADER, codec.header), (NATIVE_CODE, codec.code), (EVENTS_HEADER, write_event_table())):
+    for name, text in (
+        (NATIVE_HEADER, codec.header),
+        (NATIVE_CODE, codec.code),
+        (EVENTS_HEADER, write_event_table()),
+        (LOADER, LOADER_TEXT),
+    ):
         (folder / name).write_text(text)
-    provision_node(TubeSettings(2), 1, folder)  # for the header that loads an image
     places = (FIRMWARE, TUBE_SOURCES, TUBE_SOURCES / "mps2")
     sources = [str(source) for place in places for source in sorted(place.glob("*.c"))]
     own = ("borechain_step.c", "borechain_orders.c", NATIVE_CODE, str(FIRMWARE / "mps2" / "start.c"))

@@ -13,11 +13,12 @@ import numpy as np
 from c_library import load_checked
 
 from node.firmware.event_words import EVENTS_HEADER, write_event_table
-from node.firmware.node_image import IMAGE, provision_node
+from node.firmware.node_image import IMAGE, LOADER, LOADER_TEXT, provision_node
 from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.integer_node import READING_SCALES
 from node.kernels.record.node_record import READING
+from node.kernels.record.sensor_record import MAX_IMUS
 from node.translation.c_file import CODE
 from node.translation.firmware_build import FirmwareRequest, build_firmware
 from node.translation.orders_file import ORDERS_CODE
@@ -39,11 +40,11 @@ EXCHANGES, WRONG_ABOVE, WRONG_BELOW, BOOTS, NEXT_NUMBER, OVERFLOWS = range(6)
 
 def build_node(folder: Path) -> ctypes.CDLL:
     """The node's C as a library; an undefined operation in what is written by hand ends the process."""
-    build_firmware(FirmwareRequest("c", 1, folder))
+    build_firmware(FirmwareRequest("c", MAX_IMUS, folder))
     codec = write_native_codec()
     for name, text in ((NATIVE_HEADER, codec.header), (NATIVE_CODE, codec.code), (EVENTS_HEADER, write_event_table())):
         (folder / name).write_text(text)
-    provision_node(TubeSettings(2), 1, folder)
+    (folder / LOADER).write_text(LOADER_TEXT)
     own = [*FIRMWARE.glob("*.c"), *(FIRMWARE / "tube").glob("*.c"), SHIM]
     includes = ("-I.", f"-I{FIRMWARE}", f"-I{FIRMWARE / 'tube'}", "-Wno-array-bounds", "-DCHIP_END_ROOM=480u")
     step = ["gcc", "-std=c99", "-O1", "-fwrapv", "-fPIC", "-c", CODE, ORDERS_CODE, NATIVE_CODE]  # checked elsewhere
@@ -82,7 +83,7 @@ class ChipNode:
 
     def read_sensor(self, rate: tuple[float, ...], force: tuple[float, ...], now_us: int) -> None:
         """A cycle's means, rad/s and m/s^2."""
-        row = np.zeros(READING, np.int64)
+        row = np.zeros(MAX_IMUS * READING, np.int64)
         values = (*rate, *(component / GRAVITY for component in force), 25.0)
         row[:7] = [round(value * scale) for value, scale in zip(values, READING_SCALES[:7], strict=True)]
         self._alive(self._library.shim_readings(row.ctypes.data_as(ctypes.c_void_p), self._own(now_us)))
@@ -113,6 +114,7 @@ class Neighbour:
 
     def __init__(self, endpoint: Endpoint, side: Side) -> None:
         self.endpoint, self.side = endpoint, side
+        endpoint.limit_bundles(side, 0)  # as a port of CAN does
         self.exchange = CanExchange(endpoint.address, FD, SendQueue(MAX_FRAME), 9, 0.0, NativeProfile())
         self.heard: list[Any] = []
 
@@ -191,7 +193,7 @@ class ChipBetween:
 
 def image_of(settings: TubeSettings, folder: Path) -> bytes:
     """Image that the chip of a tube begins with."""
-    provision_node(settings, 1, folder)
+    provision_node(settings, MAX_IMUS, folder)  # of eight IMUs: that of one is another process's work
     return (folder / IMAGE).read_bytes()
 
 
