@@ -23,10 +23,18 @@ from chip_in_process import (
     wrapped,
 )
 from needed_programs import needs_gcc
+from one_node import node_of
+from recorded_calls import leaves
+from rough_node import RoughNode
 
 from node.firmware.event_table import EVENT_TABLE
 from node.firmware.event_words import arguments_in_c
+from node.firmware.saved_state import pack_state_slot, resume_node, unpack_state_slot
 from node.firmware.tube_settings import MakeUpAngle, TubeSettings
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.integer_node import FIXED_CONFIG, FIXED_NODE, new_integers
+from node.kernels.step.fixed_node import FixedNode
+from node.kernels.step.shadow_words import learn_node
 from telemetry.application.endpoint import Endpoint
 from telemetry.messages import (
     BASE,
@@ -240,3 +248,33 @@ def _encoded(receipt: Receipt) -> bytes:
     from telemetry.presentation.msgpack_codec import encode_message
 
     return encode_message(receipt)
+
+
+WORK_SPACE = ("filter.gain", "filter.ph", "filter.rest", "filter.decay", "filter.overflows", "guard.found", ".m")
+
+
+@pytest.mark.parametrize("cycles", [5, 150, 470, 640])
+def test_a_start_from_a_save_is_that_of_python(library: ctypes.CDLL, cycles: int) -> None:
+    """Word by word, but for what floats round and for work space; at rest, turning, aligning, with faults."""
+    node, rough = FixedNode(), RoughNode(1, np.random.default_rng(cycles))
+    nodes, settings, parameters = node_of(1, 2, np.random.default_rng(cycles))
+    for k in range(cycles):
+        node.step(nodes, settings, parameters, *rough.step(k))
+        node.aiding(nodes, settings, rough.aiding(k))
+    ours = bytearray(node._integers["node"].tobytes())
+    kept = np.frombuffer(ours, FIXED_NODE)
+    configs = default_config()
+    nodes = unpack_state_slot(pack_state_slot(nodes, b"", 1)).nodes
+    resume_node(nodes, configs)
+    integers = new_integers()
+    learn_node(nodes, settings, integers)
+    given = np.frombuffer(bytearray(integers["node"][0]["config"].tobytes()), FIXED_CONFIG)
+    library.shim_resume(kept.ctypes.data_as(ctypes.c_void_p), given.ctypes.data_as(ctypes.c_void_p))
+    theirs = integers["node"].tobytes()
+    differ = {}
+    for path, at, size in leaves(FIXED_NODE):
+        a, b = (int.from_bytes(of[at : at + size], "little", signed=True) for of in (bytes(ours), theirs))
+        is_near = abs(a - b) <= max(1, abs(b) >> 48)
+        if not is_near and not any(name in path for name in WORK_SPACE):
+            differ[path] = (a, b)
+    assert differ == {}

@@ -121,7 +121,7 @@ def living(bus: ZenohBus) -> Iterator[Surface]:
 
 def world_of(begin: float) -> World:
     """A string of three that rests, and turns and stops again and again, in the time of this machine's clock."""
-    blocks = max(1, math.ceil(60.0 * MINUTES / (STOP + TURNING)))
+    blocks = 3 + math.ceil(60.0 * MINUTES / (STOP + TURNING))  # longer than all that is waited for
     return World(
         scenario_of(
             {

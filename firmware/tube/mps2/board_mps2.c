@@ -15,6 +15,15 @@
 #define UART_STATE 4u
 #define UART_CONTROL 8u
 #define UART_DIVISOR 16u
+#define UART_CLEAR 12u
+#define UART_RUNS 11u                        /* sends, receives, and asks for the processor at a byte */
+#define WAKING REGISTER(0x40001008u)         /* a second timer, which wakes the processor every millisecond */
+#define WAKING_CONTROL REGISTER(0x40001000u)
+#define WAKING_CLEAR REGISTER(0x4000100Cu)
+#define MAY_WAKE REGISTER(0xE000E100u)       /* interrupts that do */
+#define PENDING REGISTER(0xE000E280u)
+#define WAKERS 0x215u                        /* bytes of three lines, the second timer */
+#define TICKS_A_WAKE 25000u
 #define TIMER_CONTROL REGISTER(0x40000000u)
 #define TIMER_VALUE REGISTER(0x40000004u)
 #define TIMER_RELOAD REGISTER(0x40000008u)
@@ -209,13 +218,32 @@ static void hear_sensor(void)
     }
 }
 
+/* Until a byte has come or a millisecond has gone. */
+static void sleep_a_while(void)
+{
+    uint32_t line;
+    if (has_byte(0u) || has_byte(1u) || has_byte(SENSOR)) {
+        return;
+    }
+    __asm__ volatile("wfi");
+    WAKING_CLEAR = 1u;
+    for (line = 0u; line < 3u; line++) {
+        REGISTER(UART(line) + UART_CLEAR) = 2u;
+    }
+    PENDING = WAKERS;
+}
+
 static void begin_board(void)
 {
     uint32_t line;
     for (line = 0u; line < 3u; line++) {
         REGISTER(UART(line) + UART_DIVISOR) = 16u;
-        REGISTER(UART(line) + UART_CONTROL) = 3u;
+        REGISTER(UART(line) + UART_CONTROL) = UART_RUNS;
     }
+    __asm__ volatile("cpsid i"); /* interrupts end a sleep and are not taken */
+    WAKING = TICKS_A_WAKE;
+    WAKING_CONTROL = 9u;
+    MAY_WAKE = WAKERS;
     TIMER_RELOAD = UINT32_MAX;
     TIMER_VALUE = UINT32_MAX;
     TIMER_CONTROL = 1u;
@@ -241,6 +269,7 @@ int main(void)
         for (side = 0u; side < 2u; side++) {
             speak_at(side, now_ms());
         }
+        sleep_a_while();
     }
     for (;;) {
     }
