@@ -86,7 +86,7 @@ tests: $(STAMP)  ## every test but the statistical ones at full size
 	$(PYTEST) -m "not statistical"
 
 statistical: kernels  ## the statistical tests at full size, properties with more examples; part of `make study`
-	$(PYTEST) --timeout 1800 -m statistical  # a watchdog: six workers that compile the integers at once take minutes each
+	BORECHAIN_CHIP_MINUTES=30 $(PYTEST) --timeout 1800 -m statistical  # a watchdog: six workers that compile the integers at once take minutes each
 	HYPOTHESIS_PROFILE=study $(PYTEST) -m "hypothesis and not statistical"
 
 truth: $(STAMP)  ## the table of the field by a second world, beside the study's

@@ -41,13 +41,62 @@ void chip_end_begin(
     (void)isotp_listen(&end->receivers[1], end->incoming, CHIP_END_ROOM);
 }
 
-void chip_end_say(struct chip_end *end, uint32_t identifier, const uint8_t *data, uint8_t length)
+/* The place of a message: of the same topic, or a free one, or that of the least urgent. */
+static struct chip_end_signals *place_of(struct chip_end *end, uint32_t identifier, uint8_t topic)
 {
-    if (length <= CHIP_END_SIGNALS) {
-        end->signals_identifier = identifier | (uint32_t)end->address << 13;
-        end->signals_length = length;
-        memcpy(end->signals, data, length);
+    struct chip_end_signals *least = &end->signals[0], *found = NULL;
+    uint32_t k;
+    for (k = 0u; k < CHIP_END_WAITING; k++) {
+        struct chip_end_signals *const one = &end->signals[k];
+        if (one->length > 0u && one->identifier == identifier && one->topic == topic) {
+            return one;
+        }
+        if (one->length == 0u) {
+            found = one;
+        } else if (one->identifier > least->identifier) {
+            least = one;
+        }
     }
+    return found != NULL ? found : least->identifier > identifier ? least : NULL;
+}
+
+void chip_end_say(
+    struct chip_end *end,
+    uint32_t identifier,
+    uint8_t topic,
+    const uint8_t *data,
+    uint8_t length)
+{
+    const uint32_t own = identifier | (uint32_t)end->address << 13;
+    struct chip_end_signals *const place = length > CHIP_END_SIGNALS ? NULL : place_of(end, own, topic);
+    if (place != NULL) {
+        place->identifier = own;
+        place->topic = topic;
+        place->length = length;
+        memcpy(place->data, data, length);
+    }
+}
+
+/* The most urgent of the signals that wait; 0 where none do. */
+static uint8_t next_signals(struct chip_end *end, uint32_t *identifier, uint8_t *data)
+{
+    struct chip_end_signals *first = NULL;
+    uint8_t length;
+    uint32_t k;
+    for (k = 0u; k < CHIP_END_WAITING; k++) {
+        struct chip_end_signals *const one = &end->signals[k];
+        if (one->length > 0u && (first == NULL || one->identifier < first->identifier)) {
+            first = one;
+        }
+    }
+    if (first == NULL) {
+        return 0u;
+    }
+    length = first->length;
+    first->length = 0u;
+    *identifier = first->identifier;
+    memcpy(data, first->data, length);
+    return length;
 }
 
 static void deliver(void *own, const struct link_entry *entry)
@@ -69,7 +118,9 @@ static void on_tunnel(struct chip_end *end, uint32_t priority, const uint8_t *da
     end->priorities[which] = (uint8_t)priority;
     answer = isotp_on_frame(receiver, data, length, now_ms);
     if (answer == ISOTP_WHOLE) {
-        if (link_receive(&end->link, receiver->room, receiver->length, now_ms, deliver, end) != LINK_TAKEN) {
+        const bool has_room = end->calls.has_room == NULL || end->calls.has_room(end->calls.own);
+        if (link_receive(&end->link, receiver->room, receiver->length, now_ms, has_room ? deliver : NULL, end) !=
+            LINK_TAKEN) {
             end->wrong++;
         }
     } else if (answer != ISOTP_NOTHING) {
@@ -148,11 +199,8 @@ static uint8_t choose(struct chip_end *end, uint32_t *identifier, uint8_t data[I
             return ISOTP_FLOW_LENGTH;
         }
     }
-    if (end->signals_length > 0u) {
-        length = end->signals_length;
-        end->signals_length = 0u;
-        memcpy(data, end->signals, length);
-        *identifier = end->signals_identifier;
+    length = next_signals(end, identifier, data);
+    if (length > 0u) {
         return length;
     }
     if (!end->sender.is_open) {

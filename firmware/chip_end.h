@@ -10,9 +10,12 @@
 #include "isotp.h"
 #include "native_receiver.h"
 
+#ifndef CHIP_END_ROOM
 #define CHIP_END_ROOM 640u /* bytes of the largest frame of the link, each way */
+#endif
 #define CHIP_END_URGENT 128u
 #define CHIP_END_SIGNALS 64u
+#define CHIP_END_WAITING 8u /* messages of signals that wait for the controller */
 #define CHIP_END_NOTHING 255u
 
 /* Of a node, what the end calls. */
@@ -20,6 +23,15 @@ struct chip_end_calls {
     void *own;
     void (*on_payload)(void *own, const uint8_t *payload, uint32_t length);          /* by the link, once */
     void (*on_signals)(void *own, int type, const union native_message *heard);
+    bool (*has_room)(void *own); /* for a payload; NULL: always. One for which there is none comes again */
+};
+
+/* Signals that wait: a newer message of the same topic takes their place. */
+struct chip_end_signals {
+    uint32_t identifier;
+    uint8_t topic;
+    uint8_t length; /* 0: free */
+    uint8_t data[CHIP_END_SIGNALS];
 };
 
 struct chip_end {
@@ -31,14 +43,12 @@ struct chip_end {
     uint8_t outgoing[CHIP_END_ROOM];
     uint8_t incoming[CHIP_END_ROOM];
     uint8_t urgent[CHIP_END_URGENT];
-    uint8_t signals[CHIP_END_SIGNALS];
-    uint32_t signals_identifier;
+    struct chip_end_signals signals[CHIP_END_WAITING];
     uint32_t shown_at_ms;   /* the last sign of life */
     uint32_t told_at_ms;    /* the last header of the link */
     uint32_t begun_ms;
     uint32_t nonce;
     uint32_t wrong;         /* frames of no effect */
-    uint8_t signals_length; /* 0: none wait */
     uint8_t priorities[2];  /* of the payloads that come in */
     uint8_t address;
     uint8_t largest;
@@ -53,8 +63,14 @@ void chip_end_begin(
     uint8_t largest,
     uint32_t nonce,
     uint32_t now_ms);
-/* Signals to go next, in place of those that wait. */
-void chip_end_say(struct chip_end *end, uint32_t identifier, const uint8_t *data, uint8_t length);
+/* Signals to go, the most urgent first; they take the place of those that wait of the same identifier and topic, such as
+ * the tube whose state they are. Where none is free they take that of the least urgent, or are dropped. */
+void chip_end_say(
+    struct chip_end *end,
+    uint32_t identifier,
+    uint8_t topic,
+    const uint8_t *data,
+    uint8_t length);
 void chip_end_on_frame(struct chip_end *end, uint32_t identifier, const uint8_t *data, uint8_t length, uint32_t now_ms);
 void chip_end_on_acknowledged(struct chip_end *end);
 /* Length of the next frame, CHIP_END_NOTHING where none is due. */

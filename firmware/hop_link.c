@@ -177,7 +177,7 @@ enum link_answer link_receive(
     }
     /* numbers of a sender that knows this process, not the one before a restart */
     is_known = header.peer_epoch >> BOOT_SHIFT == link->boot_count && (header.peer_epoch & 0xFFu) == link->address;
-    while (link_next_entry(&entries, &entry)) {
+    while (deliver != NULL && link_next_entry(&entries, &entry)) {
         if (entry.number == 0u || (is_known && is_new(link, entry.number, now_ms))) {
             deliver(own, &entry);
         }

@@ -71,7 +71,7 @@ enum link_answer {
     LINK_OLD_SESSION = -2 /* a late frame of a session that the peer has ended */
 };
 
-/* What came for the first time. */
+/* What came for the first time. Without it a frame acknowledges what was sent, and what it brings is to come again. */
 typedef void (*link_deliver)(void *own, const struct link_entry *entry);
 
 /* False for anything but a frame; else its header, and the entries for link_next_entry. */

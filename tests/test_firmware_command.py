@@ -26,7 +26,8 @@ def test_the_source_needs_no_compiler(tmp_path: Path, monkeypatch: pytest.Monkey
     done = build("--out", tmp_path / "made")
     assert done.exit_code == 0, done.output
     assert {path.name for path in (tmp_path / "made").iterdir()} == {
-        "borechain_orders.c", "borechain_orders.h", "borechain_step.c", "borechain_step.h", "borechain_step.sizes.txt",
+        "borechain_events.h", "borechain_orders.c", "borechain_orders.h", "borechain_step.c", "borechain_step.h",
+        "borechain_step.sizes.txt",
     }  # fmt: skip
     source = re.findall("source ([0-9a-f]{16})", done.output)
     assert f'#define BORECHAIN_DIGEST "{source[0]}"' in (tmp_path / "made" / "borechain_step.h").read_text()

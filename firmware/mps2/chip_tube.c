@@ -84,7 +84,7 @@ static void on_signals(void *own, int type, const union native_message *heard)
     state.systematic_var = heard->aiding.systematic_var;
     state.epoch = heard->aiding.epoch;
     if (borechain_native_pack_node_state(&state, (uint8_t)end.link.frames, data) == BORECHAIN_NATIVE_TAKEN) {
-        chip_end_say(&end, BORECHAIN_NATIVE_NODE_STATE_IDENTIFIER, data, sizeof data);
+        chip_end_say(&end, BORECHAIN_NATIVE_NODE_STATE_IDENTIFIER, TUBE, data, sizeof data);
     }
 }
 
@@ -93,7 +93,7 @@ static void say_hello(void)
     const struct borechain_native_hello hello = {TUBE, BOOT_COUNT, -1, STILL, 100u};
     uint8_t data[BORECHAIN_NATIVE_HELLO_LENGTH];
     if (borechain_native_pack_hello(&hello, (uint8_t)end.link.frames, data) == BORECHAIN_NATIVE_TAKEN) {
-        chip_end_say(&end, BORECHAIN_NATIVE_HELLO_IDENTIFIER, data, sizeof data);
+        chip_end_say(&end, BORECHAIN_NATIVE_HELLO_IDENTIFIER, 0u, data, sizeof data);
     }
 }
 
@@ -144,7 +144,7 @@ static void speak(uint32_t now)
 
 int main(void)
 {
-    const struct chip_end_calls calls = {NULL, on_payload, on_signals};
+    const struct chip_end_calls calls = {NULL, on_payload, on_signals, NULL};
     uint32_t hello_at_ms = 0u;
     UART_DIVISOR = 16u;
     UART_CONTROL = 3u;

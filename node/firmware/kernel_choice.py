@@ -24,6 +24,7 @@ class Loop(NamedTuple):
 
 
 CHIP: Final = "chip"  # kernel of a tube that steps on an emulated chip: none of a whole string
+LIBRARY: Final = "library"  # that of a board whose integers step in the C library, in a process without a compiler
 MakeLoop: TypeAlias = "Callable[[Array | None], Loop]"
 
 
@@ -52,8 +53,21 @@ def chip_loop(integers: Array | None = None) -> Loop:
     return Loop(chip.run_cycle, chip.offer_aiding, chip.step, chip.aiding)
 
 
+def library_loop(integers: Array | None = None) -> Loop:
+    """The filter in integers in the C library; see ``node.firmware.library_node.LibraryNode``."""
+    from node.firmware.library_node import LibraryNode
+
+    node = LibraryNode(integers)
+    return Loop(node.run_cycle, node.offer_aiding, node.step, node.aiding)
+
+
 # each is loaded only when used
-LOOPS: Final[dict[str, MakeLoop]] = {"float64": float64_loop, "fixed": fixed_loop, CHIP: chip_loop}
+LOOPS: Final[dict[str, MakeLoop]] = {
+    "float64": float64_loop,
+    "fixed": fixed_loop,
+    CHIP: chip_loop,
+    LIBRARY: library_loop,
+}
 
 
 def kernel_of(kernel: str, integers: Array | None = None) -> Loop:

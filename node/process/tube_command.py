@@ -21,7 +21,13 @@ def node(request: TubeRequest, ends: EndsRequest, place: PlaceRequest) -> None:
       borechain node --tube 1 --imu mpu6500:1:0x68 --imu mpu6500:1:0x69
       borechain node --tube 1 --clock own --imu mpu6500:1 --above 2 --folder state/tube-1
       borechain node --tube 2 --clock own --imu mpu6500:1 --upper can:can0 --lower can:can1
+      borechain node --tube 2 --clock own --imu mpu6500:1 --kernel fixed --compiled-by c
     """
+    if request.compiled_by == "c":
+        from node.uncompiled.numba_stand_in import stand_in_for_numba
+
+        stand_in_for_numba()  # before the first kernel is imported
+
     from node.process.drivers.choice import imu_source
     from node.process.drivers.mpu_chips import CHIPS
     from node.process.node_host import run_node

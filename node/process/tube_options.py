@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from node.process.cluster_options import ClusterRequest
+from telemetry.runtime.command_line import InputFault
 from telemetry.runtime.process_options import (
     EndsRequest,
     PlaceRequest,
@@ -47,6 +48,18 @@ class TubeRequest:
     joints: Literal["marks", "solved", "both"]
     gyro_noise: Path | None
     imus: ClusterRequest
+    compiled_by: Literal["numba", "c"] = "numba"
+
+    def __post_init__(self) -> None:
+        """Refuse what there is no C of.
+
+        Raises
+        ------
+        InputFault
+            When floats are asked for in C.
+        """
+        if self.compiled_by == "c" and self.kernel != "fixed":
+            raise InputFault(f"--compiled-by c: expected --kernel fixed with it, got {self.kernel}")
 
     def to_settings(self) -> TubeSettings:
         """Settings of the node in SI and rad.
@@ -56,6 +69,7 @@ class TubeRequest:
         NodeConfigurationError, CalibrationError, LoggerError
             When a setting is outside its range, or a file is not a calibration, or not of a gyroscope's noise.
         """
+        from node.firmware.kernel_choice import LIBRARY
         from node.firmware.tube_settings import TubeSettings
         from node.kernels.record.filter_record import Scheme
         from telemetry.records.noise_file import read_gyro_noise
@@ -66,7 +80,7 @@ class TubeRequest:
             lower_joint=self._angle_of(self.lower_joint_deg),
             mount_std=math.radians(self.mount_std_deg),
             scheme=Scheme[self.scheme.upper()],
-            kernel=self.kernel,
+            kernel=LIBRARY if self.compiled_by == "c" else self.kernel,
             stiffness=self.stiffness_nm,
             torsion=self.torsion,
             joints=self.joints,
@@ -179,8 +193,17 @@ SETTING_OPTIONS = (
     ),
 )  # what the crew knows of a tube; the other options say where its node runs
 
+compiler_option = click.option(
+    "--compiled-by",
+    type=click.Choice(["numba", "c"]),
+    default="numba",
+    show_default=True,
+    help="Of the kernel fixed: numba in the process, or the C library made once by this machine's C compiler.",
+)
+
 tube_options = gather_options(
     *SETTING_OPTIONS,
+    compiler_option,
     clock_option,
     above_option,
     below_option,

@@ -11,6 +11,7 @@ from typing import Any, Final
 from node.kernels.arithmetic.formats import TIME_Q, TURNS_Q, Array
 from node.kernels.arithmetic.quantity import NO_NUMBER
 from node.kernels.filter.modes import STATIC_BIAS
+from node.kernels.filter.resets import resume_filter as resume_saved
 from node.kernels.record.events import TOLD_Q, Code
 from node.kernels.record.node_record import EVENTS_KEPT
 from node.kernels.sensors.aligner import FASTEST as FASTEST_TURN
@@ -95,6 +96,12 @@ def begin_turns(node: Any, method: int, turns: int) -> None:
     event.numbers[1] = turns << (TOLD_Q - TURNS_Q)
     event.numbers[2], event.numbers[3] = NO_NUMBER, NO_NUMBER
     events.told += 1
+
+
+def resume_filter(nodes: Array) -> int:
+    """Make a saved filter ready for its first cycle after an outage of unknown length."""
+    resume_saved(nodes[0].filter)
+    return TAKEN
 
 
 def next_event(nodes: Array, numbers: Array) -> int:

@@ -10,7 +10,7 @@ from node.translation.c_file import HEADER, NODES, declare_arguments, rename_ent
 from node.translation.c_lines import break_line
 from node.translation.c_program import CProgram
 from node.translation.c_structs import PREFIX, CStructs
-from node.translation.chip_orders import next_event, order_alignment, order_record, order_survey
+from node.translation.chip_orders import next_event, order_alignment, order_record, order_survey, resume_filter
 from node.translation.kernel_source import integer_source
 from node.translation.kinds_of_values import INTEGER, ArrayOf, Kind, declare_variable
 
@@ -20,6 +20,7 @@ ORDERS: Final[dict[str, tuple[Callable[..., Any], tuple[Kind, ...]]]] = {
     "order_survey": (order_survey, (NODES,)),
     "order_record": (order_record, (NODES, INTEGER, INTEGER)),
     "order_alignment": (order_alignment, (NODES, INTEGER, INTEGER)),
+    "resume_filter": (resume_filter, (NODES,)),
     "next_event": (next_event, (NODES, ArrayOf(INTEGER, (NUMBERS,)))),
 }
 ANSWERS: Final = """\

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +30,17 @@ SOURCES = [
 CHIP, TUBE, NOTHING = 2, 1, 255
 ON_PAYLOAD = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.POINTER(ctypes.c_uint8), ctypes.c_uint32)
 ON_SIGNALS = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_void_p)
+HAS_ROOM = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p)
 STEP_MS = 3
 
 
 class Calls(ctypes.Structure):
-    _fields_ = [("own", ctypes.c_void_p), ("on_payload", ON_PAYLOAD), ("on_signals", ON_SIGNALS)]
+    _fields_ = [
+        ("own", ctypes.c_void_p),
+        ("on_payload", ON_PAYLOAD),
+        ("on_signals", ON_SIGNALS),
+        ("has_room", HAS_ROOM),
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +57,8 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
 class ChipSide:
     """The end in C; its link is what it begins with."""
 
-    def __init__(self, library: ctypes.CDLL, largest: int) -> None:
+    def __init__(self, library: ctypes.CDLL, largest: int, has_room: Callable[[], bool] = lambda: True) -> None:
+        self._has_room = has_room
         self._library, self._state = library, (ctypes.c_uint64 * 1024)()
         self.payloads: list[bytes] = []
         self.kinds: list[int] = []
@@ -59,6 +67,7 @@ class ChipSide:
             None,
             ON_PAYLOAD(lambda _, payload, length: self.payloads.append(bytes(payload[:length]))),
             ON_SIGNALS(lambda _, kind, heard: self.kinds.append(kind)),
+            HAS_ROOM(lambda _: self._has_room()),
         )
         library.chip_end_begin(self._state, ctypes.byref(self._calls), CHIP, 5, largest, 77, 0)
 
@@ -67,8 +76,8 @@ class ChipSide:
         self._kept.append(content)
         assert self._library.link_send(self._state, content, len(payload))
 
-    def say(self, identifier: int, data: bytes) -> None:
-        self._library.chip_end_say(self._state, identifier, data, len(data))
+    def say(self, identifier: int, data: bytes, topic: int = 0) -> None:
+        self._library.chip_end_say(self._state, identifier, topic, data, len(data))
 
     def next_frame(self, now_ms: int) -> tuple[int, bytes] | None:
         identifier, data = ctypes.c_uint32(), (ctypes.c_uint8 * 72)()
@@ -153,3 +162,38 @@ def test_signals_go_both_ways(library: ctypes.CDLL, largest: int) -> None:
     carry(chip, tube, set(), 40)
     assert tube.payloads == [encode_message(TimeRequest(12.5))]
     assert chip.kinds == [MessageKind.TIME_REQUEST]
+
+
+@needs_gcc
+def test_a_payload_without_room_comes_again_and_once(library: ctypes.CDLL) -> None:
+    """While there is none, what the other end acknowledges still counts."""
+    looks = iter([False] * 4 + [True] * 1000)
+    chip, tube = ChipSide(library, 64, lambda: next(looks)), TubeSide(64)
+    tube.link.send_best_effort(encode_message(Hello(TUBE, 1, 1, NodeMode.STILL, 1.0)), "hello")
+    chip.send(b"from below")
+    tube.link.send_reliable(b"from above", Priority.BLOCK)
+    carry(chip, tube, set(), 4000)
+    assert (chip.payloads, tube.payloads) == ([b"from above"], [b"from below"])
+    assert tube.link.waiting == 0
+
+
+@needs_gcc
+def test_signals_wait_by_topic_and_the_most_urgent_goes_first(library: ctypes.CDLL) -> None:
+    chip = ChipSide(library, 64)
+    chip.next_frame(0)  # the sign of life
+    state, hello, time = 0x14A01FFF, 0x08401FFF, 0x00601FFF
+    for identifier, topic, data in (
+        (state, 3, b"old"), (state, 4, b"four"), (hello, 0, b"hello"), (state, 3, b"new"), (time, 0, b"time"),
+    ):  # fmt: skip
+        chip.say(identifier, data, topic)
+    chip.on_acknowledged()
+    said = []
+    while (frame := chip.next_frame(1)) is not None:
+        said.append(frame[1])
+        chip.on_acknowledged()
+    assert said[:2] == [b"time", b"hello"]
+    assert sorted(said[2:4]) == [b"four", b"new"]
+    for tube in range(20):  # more than there is room for: none displaces what is more urgent
+        chip.say(state, bytes([tube]), tube)
+    chip.say(time, b"time", 0)
+    assert chip.next_frame(2) == (time | CHIP << 13, b"time")

@@ -12,8 +12,8 @@ from telemetry.presentation.can_c_codec import NATIVE_CODE, NATIVE_HEADER, write
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 SOURCES = sorted(path.name for path in FIRMWARE.glob("*.c"))
 CHIP = ("-mcpu=cortex-m4", "-mthumb", "-Os", "-ffreestanding")
-OF_THE_COMPILER = {"memcpy", "memset", "memcmp"}  # gcc asks for them of any program
-MOST_FLASH = 12_000  # bytes, the codec's included
+OF_THE_COMPILER = {"memcpy", "memset", "memcmp", "__aeabi_ldivmod", "__aeabi_uldivmod"}  # gcc asks for them itself
+MOST_FLASH = 17_500  # bytes, the codec included: 12 000 of the link, 4 700 of clock, payloads and hash
 
 
 def folder_with_codec(folder: Path) -> Path:

@@ -7,6 +7,7 @@ import datetime
 import json
 import math
 import queue
+import re
 import shutil
 import signal
 import socket
@@ -19,7 +20,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 from forked_commands import Command as Forked
-from rigs import PATIENCE, first_answer, free_endpoint, run, started
+from rigs import PATIENCE, first_answer, free_endpoint, run, started, started_by
 
 from borechain.pki.access import read_access
 from borechain.pki.rig_keys import add_tube, init_rig
@@ -107,6 +108,19 @@ class String:
         self.running.clear()
 
 
+class StartedNode:
+    """A node that is no child of a process with numba; it ends when it is asked to."""
+
+    def __init__(self, *words: str) -> None:
+        self._process = started_by((), *words)
+        self.pid = self._process.pid
+        self.said: tuple[str, str] = ("", "not ended")
+
+    def close(self) -> None:
+        self._process.send_signal(signal.SIGTERM)
+        self.said = self._process.communicate(timeout=PATIENCE)
+
+
 @pytest.fixture
 def router() -> Iterator[tuple[str, ZenohBus]]:
     endpoint = free_endpoint()
@@ -189,6 +203,23 @@ def test_a_node_finds_its_yaw_keeps_it_over_kills_of_both_and_ends_when_asked(
         report = json.loads((tmp_path / name / "timing.json").read_text())
         assert report["cycles"] > 0
         assert report["stages_ms"]["cycle"]["count"] == report["cycles"]
+
+
+def test_a_node_whose_step_is_the_c_library_has_no_compiler_in_its_process(string: String, surface: Surface) -> None:
+    """Started as on a board; what it says is that of a node."""
+    string.start_encoder()
+    imu, joint = f"timed:{string.folder / 'tube-1.npy'}", string.world.tube_settings(1).drive_joint
+    made = ("--kernel", "fixed", "--compiled-by", "c", f"--drive-joint-deg={math.degrees(joint.angle)}")
+    place = ("--endpoint", string.endpoint, "--folder", str(string.folder / "node"), "--rig", RIG)
+    own = ("node", "--tube", "1", "--clock", "own", "--above", "encoder", "--imu", imu)
+    with contextlib.closing(StartedNode(*own, *made, *place)) as process:
+        state = surface.first(NodeState, lambda s: not s.flags & UNFIT)
+        assert abs(yaw_error(string.world, 1, state.yaw, state.at)) < 0.02
+        loaded = Path(f"/proc/{process.pid}/maps").read_text()
+        assert "step-" in loaded
+        assert not {"llvmlite", "numba", "scipy"} & set(re.findall(r"site-packages/([a-z]+)", loaded))
+    assert process.said == ("", "")
+    string.end()
 
 
 @pytest.mark.parametrize("settings", ["frames=fd", "frames=classic,profile=native"])

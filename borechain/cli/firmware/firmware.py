@@ -48,11 +48,14 @@ def build(target: str, imus: int, out: Path) -> None:
       borechain firmware build --out build
       borechain firmware build --target cortex-m4 --imus 1 --out build
     """
+    from node.firmware.event_words import EVENTS_HEADER, write_event_table
     from node.translation.firmware_build import FirmwareRequest, build_firmware
 
     make_folder(out)
     built = build_firmware(FirmwareRequest(target, imus, out))
-    for path in built.files:
+    events = out / EVENTS_HEADER
+    events.write_text(write_event_table(), encoding="utf-8")
+    for path in (*built.files, events):
         click.echo(path)
     click.echo(f"source {built.digest}, {built.memory} bytes of records a node")
     if built.size is not None:

@@ -1,0 +1,186 @@
+"""A whole tube on an emulated chip for the tests: its program, its flash in a file, its joints and its sensor."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import struct
+import subprocess
+import threading
+import time
+import tty
+from pathlib import Path
+
+from node.firmware.event_words import EVENTS_HEADER, write_event_table
+from node.firmware.node_image import IMAGE, LOADER, LOADER_TEXT, provision_node
+from node.firmware.tube_settings import TubeSettings
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.integer_node import READING_SCALES
+from node.process.drivers.timed import TimedImu
+from node.translation.firmware_build import FirmwareRequest, build_firmware
+from node.translation.toolchains import OPTIONS, TOOLCHAINS
+from sim.can.can_hub import CanHub
+from telemetry.errors import MediumError
+from telemetry.media.can_loopback_protocol import INTERFACE
+from telemetry.media.can_medium import CanSettings
+from telemetry.media.can_port import open_controller
+from telemetry.media.chip_bridge import ChipBridge
+from telemetry.media.serial_line import SerialLine
+from telemetry.presentation.can_c_codec import NATIVE_CODE, NATIVE_HEADER, write_native_codec
+
+FIRMWARE = Path(__file__).parents[2] / "firmware"
+TUBE_SOURCES = FIRMWARE / "tube"
+FLASH_SIZE = 16 << 20  # of the emulator's memory that a file holds
+BOARD_AT, POWER_AT = 0x10000, 0x10010
+PATIENCE = 60.0
+MARK = b"\xb5"
+LINKED = ("-Wl,--gc-sections", "-DCHIP_END_ROOM=480u", "-nostartfiles", "--specs=nano.specs")
+
+
+def build_tube(folder: Path) -> Path:
+    """The program of a tube for QEMU's mps2-an386, from the sources of the product, linked for 192 kB and 32 kB."""
+    build_firmware(FirmwareRequest("c", 1, folder))
+    codec = write_native_codec()
+    for name, text in (
+        (NATIVE_HEADER, codec.header),
+        (NATIVE_CODE, codec.code),
+        (EVENTS_HEADER, write_event_table()),
+        (LOADER, LOADER_TEXT),
+    ):
+        (folder / name).write_text(text)
+    places = (FIRMWARE, TUBE_SOURCES, TUBE_SOURCES / "mps2")
+    sources = [str(source) for place in places for source in sorted(place.glob("*.c"))]
+    own = ("borechain_step.c", "borechain_orders.c", NATIVE_CODE, str(FIRMWARE / "mps2" / "start.c"))
+    options = [option for option in (*TOOLCHAINS["cortex-m4"].options, *OPTIONS) if option != "-ffreestanding"]
+    script = ("-T", str(TUBE_SOURCES / "mps2" / "mps2_small.ld"))
+    includes = ("-I.", f"-I{FIRMWARE}", f"-I{TUBE_SOURCES}")
+    command = ["arm-none-eabi-gcc", *options, *LINKED, *includes, *script, *sources, *own, "-o", "tube.elf"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return folder / "tube.elf"
+
+
+def sizes_of(program: Path) -> tuple[int, int]:
+    """Bytes of flash and of memory, the stack included, that a program takes."""
+    shown = subprocess.run(["arm-none-eabi-size", str(program)], capture_output=True, text=True, check=True).stdout
+    text, data, zeroed = map(int, shown.splitlines()[1].split()[:3])
+    return text + data, data + zeroed
+
+
+class TubeFlash:
+    """The flash of a board, in a file that the emulator shares."""
+
+    def __init__(self, path: Path, settings: TubeSettings, folder: Path) -> None:
+        self.path = path
+        provision_node(settings, 1, folder)
+        with path.open("wb") as file:
+            file.truncate(FLASH_SIZE)
+            file.write((folder / IMAGE).read_bytes())
+            for slot in range(2):
+                file.seek(0x8000 + 0x4000 * slot)
+                file.write(b"\xff" * 0x4000)
+            file.seek(BOARD_AT)
+            file.write(struct.pack("<IIqI", settings.tube, 0, round(settings.mount_std**2 * 2.0**56), 0))
+
+    def power_fails_after(self, words: int) -> None:
+        """Let the power fail after so many more words of flash; 0: it holds."""
+        with self.path.open("r+b") as file:
+            file.seek(POWER_AT)
+            file.write(struct.pack("<I", words))
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether it has, after it was to."""
+        with self.path.open("rb") as file:
+            file.seek(POWER_AT)
+            return file.read(4) == bytes(4)
+
+
+class SensorLine(threading.Thread):
+    """What the chip's sensor measures, a cycle at a time, from a recording by the clock of this machine."""
+
+    def __init__(self, line: Path, recording: Path) -> None:
+        super().__init__(daemon=True)
+        self._line, self._imu = line, TimedImu(recording)
+        self._imu.start()
+        self._ends = threading.Event()
+        self._gravity = float(default_config()[0]["gravity"])
+
+    def run(self) -> None:
+        """Write a cycle's mean as it ends, until the line is gone or it is stopped."""
+        due = time.monotonic() + PERIOD
+        with contextlib.suppress(OSError), self._line.open("wb", buffering=0) as line:
+            tty.setraw(line)
+            while not self._ends.wait(max(due - time.monotonic(), 0.0)):
+                now = time.monotonic()
+                sample = self._imu.read(now - PERIOD, now)
+                numbers = (*sample.rate, *(force / self._gravity for force in sample.force), sample.temperature)
+                scaled = [round(x * scale) for x, scale in zip(numbers, READING_SCALES[:7].tolist(), strict=True)]
+                body = struct.pack("<7q", *scaled)
+                line.write(MARK + body + bytes([sum(body) & 0xFF]))
+                due += PERIOD
+
+    def stop(self) -> None:
+        """End it."""
+        self._ends.set()
+        self.join(PATIENCE)
+
+
+class EmulatedTube:
+    """A board that runs, its bridges onto two segments and its sensor.
+
+    Parameters
+    ----------
+    segments : names of the upper and of the lower segment on the hub
+    """
+
+    def __init__(
+        self, program: Path, flash: TubeFlash, hub: CanHub, segments: tuple[str, str], recording: Path
+    ) -> None:
+        self._stack = contextlib.ExitStack()
+        backend = f"memory-backend-file,id=flash,size={FLASH_SIZE},mem-path={flash.path},share=on"
+        self._process = subprocess.Popen(
+            ["qemu-system-arm", "-M", "mps2-an386,memory-backend=flash", "-object", backend, "-display", "none",
+             "-monitor", "none", "-serial", "pty", "-serial", "pty", "-serial", "pty", "-kernel", str(program)],
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        )  # fmt: skip
+        lines = [self._told_line() for _ in range(3)]
+        self._bridges = [self._bridge(lines[k], hub, segment) for k, segment in enumerate(segments)]
+        self._threads = [threading.Thread(target=self._run, args=(bridge,)) for bridge in self._bridges]
+        self._sensor = SensorLine(lines[2], recording)
+        for thread in (*self._threads, self._sensor):
+            thread.start()
+
+    def _told_line(self) -> Path:
+        assert self._process.stdout is not None
+        said = self._process.stdout.readline()
+        found = re.search(r"/dev/\S+", said)
+        assert found, said
+        return Path(found.group())
+
+    def _bridge(self, line: Path, hub: CanHub, segment: str) -> ChipBridge:
+        serial = SerialLine(line, 115200)
+        self._stack.callback(serial.close)
+        settings = CanSettings.parse(f"{hub.port}/{segment},interface={INTERFACE}")
+        controller = open_controller(lambda: settings.open_bus(""), "chip", True, None)
+        self._stack.callback(controller.shutdown)
+        return ChipBridge(serial, controller, fd=True, tell=lambda said: None)
+
+    @staticmethod
+    def _run(bridge: ChipBridge) -> None:
+        with contextlib.suppress(MediumError):  # the line ends with the emulator
+            bridge.run()
+
+    def kill(self) -> None:
+        """Take the board's power away."""
+        self._sensor.stop()
+        self._process.kill()
+        self._process.wait()
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+        for thread, bridge in zip(self._threads, self._bridges, strict=True):
+            thread.join(5.0)
+            bridge.stop()
+            thread.join(PATIENCE)
+        self._stack.close()

@@ -1,0 +1,280 @@
+"""A chip's node on this machine, in told time, between endpoints of the product: what it says, keeps and passes on."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from chip_in_process import (
+    EXCHANGES,
+    NEXT_NUMBER,
+    OVERFLOWS,
+    WRONG_ABOVE,
+    WRONG_BELOW,
+    ChipBetween,
+    ChipNode,
+    Neighbour,
+    PowerFailedError,
+    build_node,
+    image_of,
+    wrapped,
+)
+from needed_programs import needs_gcc
+from one_node import node_of
+from recorded_calls import leaves
+from rough_node import RoughNode
+
+from node.firmware.event_table import EVENT_TABLE
+from node.firmware.event_words import arguments_in_c
+from node.firmware.saved_state import pack_state_slot, resume_node, unpack_state_slot
+from node.firmware.tube_settings import MakeUpAngle, TubeSettings
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.integer_node import FIXED_CONFIG, FIXED_NODE, new_integers
+from node.kernels.step.fixed_node import FixedNode
+from node.kernels.step.shadow_words import learn_node
+from telemetry.application.endpoint import Endpoint
+from telemetry.messages import (
+    BASE,
+    Aiding,
+    Command,
+    Event,
+    NodeFlag,
+    NodeState,
+    Receipt,
+    Reply,
+    Side,
+    SurveyMeasurement,
+)
+from telemetry.presentation.content import content_of_message
+
+CHIP, BELOW = 2, 1
+EPOCH = 3
+OFFSET = 0.7  # rad, of the joint to the drive head
+SETTINGS = TubeSettings(CHIP, drive_joint=MakeUpAngle(OFFSET, 1e-3), lower_joint=MakeUpAngle(-0.4, 1e-3), state_every=2)
+pytestmark = [needs_gcc, pytest.mark.slow]
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    return build_node(tmp_path_factory.mktemp("node"))
+
+
+@pytest.fixture(scope="module")
+def image(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    return image_of(SETTINGS, tmp_path_factory.mktemp("image"))
+
+
+class Rig:
+    """A base that is the encoder too, the chip, and perhaps a tube below; the head turns as it is told to."""
+
+    def __init__(self, library: ctypes.CDLL, image: bytes, *, below: bool = False) -> None:
+        endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=EPOCH, is_clock_root=True)
+        endpoint.place.hops = 0
+        self.base = Neighbour(endpoint, Side.LOWER)
+        tube = Endpoint(BELOW, frozenset({Side.UPPER}), boot_count=1) if below else None
+        self.tube = None if tube is None else Neighbour(tube, Side.UPPER)
+        self.chip = ChipNode(library, image, SETTINGS, clock_off_us=123_456_789)
+        self.world = ChipBetween(self.chip, self.base, self.tube)
+        self.world.after_cycle = self._aid
+        self.yaw, self._sequence = 1.0, 0
+        self._receipted: set[int] = set()
+
+    def _aid(self, now: float) -> None:
+        self._sequence += 1
+        aiding = Aiding(self.yaw % math.tau, 1e-8, 0.0, 0.0, 0.0, now, 1, 0, epoch=EPOCH)
+        self.base.endpoint.send_aiding(aiding, now)
+        for message in self.base.heard:
+            if isinstance(message, Event | SurveyMeasurement) and id(message) not in self._receipted:
+                self._receipted.add(id(message))
+                self.base.endpoint.mail.acknowledge(message)
+
+    def heard(self, kind: type) -> list[Any]:
+        """Messages of a kind that the base has heard from the chip."""
+        return [m for m in self.base.heard if isinstance(m, kind) and m.tube == CHIP]
+
+
+def test_the_table_of_events_has_every_code_and_its_arguments() -> None:
+    for code, spec in EVENT_TABLE.items():
+        said = arguments_in_c(spec)
+        assert [a.name for a in said] == [name for name, _ in spec.arguments] or spec.words is not None, code
+        assert len(said) <= 10
+
+
+def test_a_chip_at_rest_finds_its_yaw_and_tells_of_it(library: ctypes.CDLL, image: bytes) -> None:
+    rig = Rig(library, image)
+    rig.world.run(65.0)
+    rig.base.endpoint.mail.command(Command(CHIP, 5, "take_survey", {}), rig.world.now)
+    rig.world.run(6.0)
+    states = rig.heard(NodeState)
+    assert len(states) > 55
+    last = states[-1]
+    assert abs(wrapped(last.yaw - 1.0 - OFFSET)) < 1e-3
+    assert last.flags == NodeFlag.NONE
+    assert (last.hops, last.epoch) == (1, EPOCH)
+    assert abs(last.at - rig.world.now) < 2.0
+    codes = [event.code for event in rig.heard(Event)]
+    assert codes[:2] == ["stopped", "booted"]
+    assert "bias_known" in codes
+    (survey,) = rig.heard(SurveyMeasurement)
+    assert abs(wrapped(survey.yaw - 1.0 - OFFSET)) < 1e-3
+    assert survey.imus[0].force[1] == pytest.approx(0.34, abs=2e-3)
+    assert survey.imus[0].force[2] == pytest.approx(-9.8, abs=2e-3)
+    assert survey.imus[0].force_cov[0][0] == pytest.approx(9e-6 / survey.samples, rel=0.6)
+    assert [rig.chip.number(k) for k in (WRONG_ABOVE, WRONG_BELOW, OVERFLOWS)] == [0, 0, 0]
+    assert rig.chip.number(EXCHANGES) > 30
+
+
+def test_orders_are_obeyed_once_and_refused_by_name(library: ctypes.CDLL, image: bytes) -> None:
+    rig = Rig(library, image)
+    rig.world.run(65.0)
+    surveys = len(rig.heard(SurveyMeasurement))
+    for number, name, arguments in (
+        (7, "take_survey", {}),
+        (8, "align", {"method": "circle", "turns": 50.0}),
+        (9, "align", {"method": "spiral", "turns": 2.0}),
+        (10, "reboot", {}),
+    ):
+        rig.base.endpoint.mail.command(Command(CHIP, number, name, arguments), rig.world.now)
+    rig.world.run(12.0)
+    replies = {reply.sequence: reply for reply in rig.heard(Reply)}
+    assert sorted(replies) == [7, 8, 9, 10]
+    assert replies[7] == Reply(CHIP, 7, True, "at the next settled cycle")
+    assert (replies[8].done, replies[8].detail) == (False, "expected a number in its range")
+    assert not replies[9].done
+    assert replies[10].detail == "expected take_survey or align: a chip obeys no other order"
+    assert len(rig.heard(SurveyMeasurement)) == surveys + 1
+    rig.base.endpoint.mail.command(Command(CHIP, 7, "take_survey", {}), rig.world.now)
+    rig.world.run(12.0)
+    assert len(rig.heard(SurveyMeasurement)) == surveys + 1  # a repeated order is answered, not obeyed again
+
+
+def test_what_is_for_others_goes_on_and_comes_back_unchanged(library: ctypes.CDLL, image: bytes) -> None:
+    rig = Rig(library, image, below=True)
+    assert rig.tube is not None
+    rig.world.run(6.0)
+    now = rig.world.now
+    assert rig.tube.endpoint.place.hops == 2
+    assert abs(rig.tube.endpoint.clock.rig_from_local(now) - now) < 12e-3  # two steps of time
+    assert rig.tube.endpoint.clock.variance(now) < (20e-3) ** 2
+    aiding = next(m for m in reversed(rig.tube.heard) if isinstance(m, Aiding))
+    assert abs(wrapped(aiding.yaw - 1.0)) < 1e-6
+    assert aiding.hops == 1
+    assert aiding.offset == pytest.approx(OFFSET - 0.4, abs=1e-6)
+    events = [Event(BELOW, k, 12.0 + k, EVENT_TABLE[1].severity, "bad_sample", {"k": k}, EPOCH) for k in range(1, 13)]
+    for event in events:
+        rig.tube.endpoint.mail.submit(event, now)
+    for k in range(3):
+        rig.base.endpoint.mail.command(Command(BELOW, 40 + k, "align", {"method": "circle", "turns": 2.0}), now)
+    rig.world.run(25.0)
+    heard = [m for m in rig.base.heard if isinstance(m, Event) and m.tube == BELOW]
+    assert {m.sequence: m for m in heard} == {m.sequence: m for m in events}
+    assert rig.tube.endpoint.mail.outbox_size == 0  # receipts went down
+    ordered = {m.sequence for m in rig.tube.heard if isinstance(m, Command)}  # again, for this tube answers none
+    assert ordered == {40, 41, 42}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_frames_that_are_lost_lose_no_message(library: ctypes.CDLL, image: bytes, seed: int) -> None:
+    rig, random = Rig(library, image, below=True), np.random.default_rng(seed)
+    rig.world.lose = lambda: bool(random.random() < 0.15)
+    rig.world.run(75.0)
+    rig.world.lose = lambda: False
+    rig.world.run(15.0)
+    numbered = {m.sequence for m in rig.base.heard if isinstance(m, Event | SurveyMeasurement) and m.tube == CHIP}
+    assert sorted(numbered) == list(range(1, rig.chip.number(NEXT_NUMBER)))
+    assert len(numbered) >= 4
+
+
+@pytest.mark.parametrize("words", [0, 1, 5, 300, 1000, 1410, 1411, 1412])
+def test_a_cut_while_it_saves_loses_nothing_and_gives_no_number_twice(
+    library: ctypes.CDLL, image: bytes, words: int
+) -> None:
+    """After so many words of flash; the save is that of an order's answer."""
+    rig = Rig(library, image)
+    rig.world.run(62.0)
+    before = rig.chip.number(NEXT_NUMBER)
+    rig.base.endpoint.mail.command(Command(CHIP, 9, "take_survey", {}), rig.world.now)
+    rig.chip.power_fails_after(words)
+    try:
+        rig.world.run(4.0)
+    except PowerFailedError:
+        rig.world.now_us += 3_000_000
+        rig.chip.begin(rig.world.now_us)
+    rig.chip.power_fails_after(-1)
+    rig.world.run(20.0)
+    events = {event.sequence: event for event in rig.heard(Event)}
+    restored = [event for event in events.values() if event.code == "restored"]
+    assert len(restored) == 1
+    assert restored[0].sequence >= before
+    assert abs(wrapped(math.radians(float(restored[0].arguments["yaw_deg"])) - 1.0 - OFFSET)) < 2e-3
+    assert [reply.sequence for reply in rig.heard(Reply)][:1] == [9]
+    kept = [m for m in rig.base.heard if isinstance(m, Event | SurveyMeasurement) and m.tube == CHIP]
+    by_number = {m.sequence: m for m in kept}
+    assert all(by_number[m.sequence] == m for m in kept)
+    assert sorted(by_number) == list(range(1, rig.chip.number(NEXT_NUMBER)))
+    states = [s for s in rig.heard(NodeState) if not s.flags & (NodeFlag.YAW_UNTRUSTED | NodeFlag.CLOCK_UNSYNCHRONISED)]
+    assert all(abs(wrapped(s.yaw - 1.0 - OFFSET)) < 3e-3 for s in states)
+    assert states[-1].flags == NodeFlag.RESTORED
+
+
+def test_a_receipt_of_other_content_forgets_nothing(library: ctypes.CDLL, image: bytes) -> None:
+    rig = Rig(library, image)
+    rig._receipted = _Everything()
+    rig.world.run(8.0)
+    (first, *_) = [event for event in rig.heard(Event) if event.sequence == 1]
+    wrong = Receipt(CHIP, 1, bytes(reversed(content_of_message(first))))
+    rig.base.endpoint.mail._send_down(_encoded(wrong), CHIP, 3)  # type: ignore[arg-type]
+    count = sum(event.sequence == 1 for event in rig.heard(Event))
+    rig.world.run(15.0)
+    assert sum(event.sequence == 1 for event in rig.heard(Event)) > count  # it is sent again
+    rig.base.endpoint.mail.acknowledge(first)
+    rig.world.run(3.0)
+    count = sum(event.sequence == 1 for event in rig.heard(Event))
+    rig.world.run(40.0)
+    assert sum(event.sequence == 1 for event in rig.heard(Event)) == count
+
+
+class _Everything(set[int]):
+    """As if all were receipted: the base sends no receipt by itself."""
+
+    def __contains__(self, _: object) -> bool:
+        return True
+
+
+def _encoded(receipt: Receipt) -> bytes:
+    from telemetry.presentation.msgpack_codec import encode_message
+
+    return encode_message(receipt)
+
+
+WORK_SPACE = ("filter.gain", "filter.ph", "filter.rest", "filter.decay", "filter.overflows", "guard.found", ".m")
+
+
+@pytest.mark.parametrize("cycles", [5, 150, 470, 640])
+def test_a_start_from_a_save_is_that_of_python(library: ctypes.CDLL, cycles: int) -> None:
+    """Word by word, but for what floats round and for work space; at rest, turning, aligning, with faults."""
+    node, rough = FixedNode(), RoughNode(1, np.random.default_rng(cycles))
+    nodes, settings, parameters = node_of(1, 2, np.random.default_rng(cycles))
+    for k in range(cycles):
+        node.step(nodes, settings, parameters, *rough.step(k))
+        node.aiding(nodes, settings, rough.aiding(k))
+    ours = bytearray(node._integers["node"].tobytes())
+    kept = np.frombuffer(ours, FIXED_NODE)
+    configs = default_config()
+    nodes = unpack_state_slot(pack_state_slot(nodes, b"", 1)).nodes
+    resume_node(nodes, configs)
+    integers = new_integers()
+    learn_node(nodes, settings, integers)
+    given = np.frombuffer(bytearray(integers["node"][0]["config"].tobytes()), FIXED_CONFIG)
+    library.shim_resume(kept.ctypes.data_as(ctypes.c_void_p), given.ctypes.data_as(ctypes.c_void_p))
+    theirs = integers["node"].tobytes()
+    differ = {}
+    for path, at, size in leaves(FIXED_NODE):
+        a, b = (int.from_bytes(of[at : at + size], "little", signed=True) for of in (bytes(ours), theirs))
+        is_near = abs(a - b) <= max(1, abs(b) >> 48)
+        if not is_near and not any(name in path for name in WORK_SPACE):
+            differ[path] = (a, b)
+    assert differ == {}

@@ -1,0 +1,272 @@
+"""A whole tube on an emulated chip between two tubes in Python, each on its own clock, over CAN: nothing lost or wrong.
+
+The base is at the surface end of a real encoder's process; the tubes above and below the chip are real nodes. The world
+is one of rests and a turn, in the time of this machine.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import queue
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from chip_board import PATIENCE, EmulatedTube, TubeFlash, build_tube, sizes_of
+from forked_commands import Command as Forked
+from needed_programs import needs
+from rigs import free_endpoint, started
+
+from node.firmware.tube_settings import TubeSettings
+from node.kernels.arithmetic.formats import PERIOD
+from node.process.counter import BootCounter
+from sim.can.can_hub import CanHub, running_hub
+from sim.world.recording import record_sensors, yaw_error
+from sim.world.scenario import scenario_of
+from sim.world.world import World
+from telemetry.application.endpoint import Endpoint
+from telemetry.media.can_loopback import register_loopback
+from telemetry.media.neighbours import neighbour_ports
+from telemetry.media.zenoh_bus import ZenohBus, open_router
+from telemetry.media.zenoh_port import ZenohMedium
+from telemetry.messages import (
+    BASE,
+    ENCODER,
+    Command,
+    Event,
+    NodeFlag,
+    NodeState,
+    Reply,
+    Side,
+    StaticRecord,
+    SurveyMeasurement,
+)
+from telemetry.runtime import event_loop
+from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
+from telemetry.runtime.process_interface import Process
+from telemetry.runtime.timing import CycleTiming
+
+RIG, CHIP, ABOVE, BELOW = "chip-between", 2, 3, 1
+UNFIT = NodeFlag.YAW_UNTRUSTED | NodeFlag.CLOCK_UNSYNCHRONISED
+REST, STOP, TURNING = 10.0, 80.0, 20.0  # s, before the string turns, of a stop after it, of a turn
+MINUTES = float(os.environ.get("BORECHAIN_CHIP_MINUTES", "2"))
+RATE_DPS = 71.0
+WORDS_UNTIL_CUT = 700  # of flash: within the content of a save
+FLASH, MEMORY = 192 * 1024, 32 * 1024
+pytestmark = [
+    pytest.mark.statistical,
+    pytest.mark.timeout(60.0 * MINUTES + 600.0),
+    needs("arm-none-eabi-gcc", "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
+    needs("qemu-system-arm", "qemu-system-arm"),
+]
+
+
+class Surface(Process):
+    """The base station: it keeps all that it hears, and receipts what is to be receipted."""
+
+    loop: OwnClockLoop
+
+    def __init__(self) -> None:
+        self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
+        self.heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self.kept: list[Any] = []
+
+    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+        for received in self.endpoint.receive(side, frame, now, margin):
+            if isinstance(received.message, Event | SurveyMeasurement | StaticRecord):
+                self.endpoint.mail.acknowledge(received.message)
+            self.heard.put(received.message)
+
+    def first(self, kind: type, fits: Callable[[Any], bool], patience: float = PATIENCE) -> Any:
+        """The next message of a kind that fits."""
+        deadline = time.monotonic() + patience
+        while True:
+            message = self.heard.get(timeout=max(deadline - time.monotonic(), 0.0))
+            self.kept.append(message)
+            if isinstance(message, kind) and fits(message):
+                return message
+
+    def order(self, tube: int, number: int, name: str, **arguments: Any) -> Reply:
+        """What a tube answers to an order."""
+        command = Command(tube, number, name, arguments)
+        self.loop.call(lambda process, now: process.endpoint.mail.command(command, now))
+        reply: Reply = self.first(Reply, lambda r: r.sequence == number and r.tube == tube)
+        return reply
+
+
+@contextlib.contextmanager
+def living(bus: ZenohBus) -> Iterator[Surface]:
+    """The base station on a bus, in a thread of its own."""
+    surface, running = Surface(), queue.SimpleQueue[OwnClockLoop]()
+
+    async def live() -> None:
+        ports = neighbour_ports(ZenohMedium(bus), RIG, BASE, {Side.LOWER: ENCODER})
+        loop = OwnClockLoop(surface, ports, OwnClock(), CycleTiming(), PERIOD)
+        running.put(loop)
+        await loop.run()
+
+    thread = threading.Thread(target=lambda: event_loop.run_event_loop(live()))
+    thread.start()
+    surface.loop = running.get(timeout=PATIENCE)
+    yield surface
+    surface.loop.stop()
+    thread.join()
+
+
+def world_of(begin: float) -> World:
+    """A string of three that rests, and turns and stops again and again, in the time of this machine's clock."""
+    blocks = 3 + math.ceil(60.0 * MINUTES / (STOP + TURNING))  # longer than all that is waited for
+    return World(
+        scenario_of(
+            {
+                "rig": {"tubes": 3, "tubes_at_start": 3, "tube_length_m": 1.0},
+                "path": {"straight": {"inclination_deg": 2.0}},
+                "schedule": {"begin_s": begin, "add_s": REST, "stop_s": STOP, "blocks": blocks},
+                "rotation": {"turns": TURNING * RATE_DPS / 360.0, "rate_dps": RATE_DPS},
+                "clocks": {"offset_std_s": 0.0, "drift_std_ppm": 0.0},
+            }
+        ),
+        seed=4,
+    )
+
+
+class String:
+    """Encoder, a tube in Python, the chip, another tube in Python; each joint a segment of CAN."""
+
+    def __init__(self, folder: Path, endpoint: str, hub: CanHub, program: Path) -> None:
+        self.folder, self.endpoint, self._hub, self._program = folder, endpoint, hub, program
+        self.world = world_of(time.monotonic())
+        record_sensors(self.world, folder)
+        told = self.world.tube_settings(CHIP)
+        own = TubeSettings(CHIP, drive_joint=told.drive_joint, lower_joint=told.lower_joint)
+        self.flash = TubeFlash(folder / "flash.bin", own, folder)
+        self.running: dict[str, Forked] = {}
+        self._chip: EmulatedTube | None = None
+
+    def joint(self, upper: str, lower: str) -> str:
+        return f"can:{self._hub.port}/{RIG}/{upper}-{lower},interface=borechain_loopback,frames=fd,profile=native"
+
+    def start(self, name: str, *options: str) -> None:
+        place = ("--endpoint", self.endpoint, "--folder", str(self.folder / name))
+        self.running[name] = started(name.split("-", maxsplit=1)[0], "--clock", "own", "--rig", RIG, *options, *place)
+
+    def start_all(self) -> None:
+        BootCounter(self.folder / "encoder")  # one that has started before: its epoch is a small number
+        counter = f"timed:{self.folder / 'encoder.npy'}"
+        self.start("encoder", "--counter", counter, "--above", "base", "--lower", self.joint("encoder", str(ABOVE)))
+        for tube, joints in (
+            (ABOVE, ("--upper", self.joint("encoder", str(ABOVE)), "--lower", self.joint(str(ABOVE), str(CHIP)))),
+            (BELOW, ("--upper", self.joint(str(CHIP), str(BELOW)))),
+        ):
+            told = self.world.tube_settings(tube)
+            angles = [
+                f"--{name}-joint-deg={math.degrees(joint.angle)}"
+                for name, joint in (("drive", told.drive_joint), ("lower", told.lower_joint))
+            ]
+            imu = f"timed:{self.folder / f'tube-{tube}.npy'}"
+            self.start(f"node-{tube}", "--tube", str(tube), "--imu", imu, *angles, *joints)
+        self.start_chip()
+
+    def start_chip(self) -> None:
+        segments = f"{RIG}/{ABOVE}-{CHIP}", f"{RIG}/{CHIP}-{BELOW}"
+        self._chip = EmulatedTube(self._program, self.flash, self._hub, segments, self.folder / f"tube-{CHIP}.npy")
+
+    def cut_chip(self) -> None:
+        if self._chip is not None:
+            self._chip.kill()
+            self._chip = None
+
+    def end(self) -> None:
+        self.cut_chip()
+        for process in self.running.values():
+            process.send_signal(signal.SIGTERM)
+        for process in self.running.values():
+            process.communicate(timeout=PATIENCE)
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build_tube(tmp_path_factory.mktemp("tube"))
+
+
+@pytest.fixture
+def surface_and_string(tmp_path: Path, program: Path) -> Iterator[tuple[Surface, String]]:
+    register_loopback()
+    endpoint = free_endpoint()
+    with open_router(endpoint) as bus, running_hub() as hub, living(bus) as surface:
+        string = String(tmp_path, endpoint, hub, program)
+        string.start_all()
+        try:
+            yield surface, string
+        finally:
+            string.end()
+
+
+def test_step_and_link_fit_a_small_chip(program: Path) -> None:
+    flash, memory = sizes_of(program)
+    assert flash <= FLASH
+    assert memory <= MEMORY
+
+
+def test_a_chip_between_two_tubes_loses_nothing_and_says_nothing_wrong(
+    surface_and_string: tuple[Surface, String],
+) -> None:
+    surface, string = surface_and_string
+    for tube in (CHIP, BELOW):
+        state = surface.first(NodeState, lambda s, tube=tube: s.tube == tube and not s.flags & UNFIT)
+        assert abs(yaw_error(string.world, tube, state.yaw, state.at)) < 0.02, tube
+        assert state.hops == ABOVE + 1 - tube
+
+    survey = surface.first(SurveyMeasurement, lambda s: s.tube == CHIP, patience=STOP + 60.0)
+    assert abs(yaw_error(string.world, CHIP, survey.yaw, survey.station_at)) < 0.02
+    begun, number = time.monotonic(), 10
+    while number == 10 or time.monotonic() - begun < 60.0 * (MINUTES - 2.0):
+        survey = order_a_survey_and_cut_the_power(surface, string, number, survey)
+        number += 2
+    judge_all(surface, string)
+
+
+def order_a_survey_and_cut_the_power(
+    surface: Surface, string: String, number: int, before: SurveyMeasurement
+) -> SurveyMeasurement:
+    """Order a survey, have the power fail while the next order's answer is saved; the newest survey after it."""
+    reply = surface.order(CHIP, number, "take_survey")
+    assert (reply.done, reply.detail) == (True, "at the next settled cycle")
+    again = surface.first(SurveyMeasurement, lambda s: s.tube == CHIP and s.station_at > before.station_at, STOP + 60.0)
+
+    string.flash.power_fails_after(WORDS_UNTIL_CUT)
+    command = Command(CHIP, number + 1, "take_survey", {})
+    surface.loop.call(lambda process, now: process.endpoint.mail.command(command, now))
+    deadline = time.monotonic() + PATIENCE
+    while not string.flash.has_failed and time.monotonic() < deadline:
+        surface.first(NodeState, lambda s: s.tube == ABOVE)
+    assert string.flash.has_failed
+    string.cut_chip()
+    string.start_chip()
+    restored = surface.first(Event, lambda e: e.tube == CHIP and e.code == "restored")
+    assert restored.sequence > again.sequence
+    replies = [m for m in surface.kept if isinstance(m, Reply) and m.sequence == number + 1]
+    assert (replies or [surface.first(Reply, lambda r: r.sequence == number + 1)])[0].done
+    last: SurveyMeasurement = surface.first(
+        SurveyMeasurement, lambda s: s.tube == CHIP and s.station_at > again.station_at, STOP + 60.0
+    )
+    assert abs(yaw_error(string.world, CHIP, last.yaw, last.station_at)) < 0.02
+    return last
+
+
+def judge_all(surface: Surface, string: String) -> None:
+    """Every number once and none missing; every yaw that is trusted within its own doubt of the truth."""
+    kept = [m for m in surface.kept if isinstance(m, Event | SurveyMeasurement) and m.tube == CHIP]
+    by_number = {m.sequence: m for m in kept}
+    assert all(by_number[m.sequence] == m for m in kept)  # what was sent again is the same
+    assert sorted(by_number) == list(range(1, max(by_number) + 1))
+    for state in surface.kept:
+        if isinstance(state, NodeState) and state.tube in (CHIP, BELOW) and not state.flags & UNFIT:
+            doubt = math.sqrt(state.yaw_var + state.systematic_var)
+            assert abs(yaw_error(string.world, state.tube, state.yaw, state.at)) < 5.0 * doubt + 0.002, state
