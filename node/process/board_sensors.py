@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
 
 from node.errors import SensorError
-from node.kernels.arithmetic.formats import PERIOD
+from node.firmware.inputs import ImuReading
+from node.kernels.arithmetic.formats import PERIOD, Array
 from node.process.board_findings import BoardFinding, bad_finding, good_finding
 from node.process.drivers.gravity_witness import FARTHEST, G
 from node.process.drivers.source import EncoderSource, ImuSample, ImuSource
@@ -23,6 +24,7 @@ NOISIEST: Final = 10.0  # times that
 LARGEST_BIAS: Final = math.radians(20.0)  # rad/s, of any part that is sold
 TURN_OFF: Final = 0.1  # of the turn that is told
 COUNTS: Final = 4096  # of a turn
+REPEATS: Final = 1e-9  # rad/s and m/s^2: means of equal counts differ by their rounding, of noise by a bit's share
 Clock = Callable[[], float]
 Sleep = Callable[[float], None]
 
@@ -51,8 +53,8 @@ def check_imu(
         if lost
         else good_finding("readings", f"{CYCLES} cycles of {PERIOD:.3f} s, none lost")
     )
-    found += _rate_findings(source)
-    return found + (_reading_findings(samples[1:], noise) if len(samples) > 2 else [])
+    found += judge_rate(source)
+    return found + (judge_readings(samples[1:], noise) if len(samples) > 2 else [])
 
 
 def describe_source(source: ImuSource | EncoderSource) -> str:
@@ -60,7 +62,7 @@ def describe_source(source: ImuSource | EncoderSource) -> str:
     return str(getattr(source, "description", type(source).__name__))
 
 
-def _rate_findings(source: ImuSource) -> list[BoardFinding]:
+def judge_rate(source: ImuSource) -> list[BoardFinding]:
     """Rate of the frames as counted, beside the one that was set."""
     told, counted = getattr(source, "sample_rate", None), getattr(source, "counted_rate", math.nan)
     if told is None or not math.isfinite(counted):
@@ -69,22 +71,44 @@ def _rate_findings(source: ImuSource) -> list[BoardFinding]:
     return [good_finding("rate", text) if abs(counted / told - 1.0) < RATE_OFF else bad_finding("rate", text)]
 
 
-def _reading_findings(samples: list[ImuSample], noise: float) -> list[BoardFinding]:
+def judge_readings(
+    samples: Sequence[ImuSample | ImuReading], noise: float, *, still: bool = True
+) -> list[BoardFinding]:
+    """Findings of three readings or more of a sensor with a noise in that of the node's configuration.
+
+    Noise, bias and gravity are judged at rest (``still``) alone; a sensor that repeats itself is found always.
+    """
     rates, forces = np.array([s.rate for s in samples]), np.array([s.force for s in samples])
     spread = rates.std(axis=0, ddof=1)
-    most = NOISIEST * noise * USUAL_NOISE
-    spread_text = f"{math.degrees(float(spread.max())):.4f} deg/s of a cycle at rest"
-    bias, size = rates.mean(axis=0), float(np.linalg.norm(forces.mean(axis=0)))
     warmth = float(np.mean([s.temperature for s in samples]))
     saturated = 0
     for sample in samples:
         saturated |= sample.saturated
-    stuck = bool(np.any(spread == 0.0) or np.any(forces.std(axis=0) == 0.0))
     which = {0: "", 1: "the gyroscope", 2: "the accelerometer", 3: "both"}[saturated & 3]
+    stuck = bool(np.any(spread < REPEATS) or np.any(forces.std(axis=0) < REPEATS))
+    found = [bad_finding("noise", "an axis repeats itself bit for bit")] if stuck else []
+    at_rest = _rest_findings(spread, rates.mean(axis=0), float(np.linalg.norm(forces.mean(axis=0))), noise)
+    for line in at_rest[1:] if stuck else at_rest:
+        found.append(line if still else good_finding(line.part, "not judged: the string turned meanwhile"))
     return [
-        bad_finding("noise", "an axis repeats itself bit for bit")
-        if stuck
-        else judge_bound("noise", float(spread.max()) <= most, spread_text, f"at most {math.degrees(most):.3f}"),
+        *found,
+        judge_bound(
+            "ranges", not saturated, "no reading at its range" if not saturated else f"{which} at its range", "none"
+        ),
+        judge_bound("temperature", COLDEST < warmth < HOTTEST, f"{warmth:.1f} C", f"{COLDEST:g}..{HOTTEST:g}"),
+    ]
+
+
+def _rest_findings(spread: Array, bias: Array, force: float, noise: float) -> list[BoardFinding]:
+    """What only a rest shows, noise first: scatter (3,) and mean (3,) of the rates, and the size of the mean force."""
+    most, largest = NOISIEST * noise * USUAL_NOISE, float(spread.max())
+    return [
+        judge_bound(
+            "noise",
+            largest <= most,
+            f"{math.degrees(largest):.4f} deg/s of a cycle at rest",
+            f"at most {math.degrees(most):.3f}",
+        ),
         judge_bound(
             "bias",
             float(np.abs(bias).max()) <= LARGEST_BIAS,
@@ -92,15 +116,8 @@ def _reading_findings(samples: list[ImuSample], noise: float) -> list[BoardFindi
             f"at most {math.degrees(LARGEST_BIAS):.0f}",
         ),
         judge_bound(
-            "gravity",
-            abs(size - G) <= FARTHEST * G,
-            f"{size:.3f} m/s^2",
-            f"{G:.2f} within {100 * FARTHEST:.0f} %",
+            "gravity", abs(force - G) <= FARTHEST * G, f"{force:.3f} m/s^2", f"{G:.2f} within {100 * FARTHEST:.0f} %"
         ),
-        judge_bound(
-            "ranges", not saturated, "no reading at its range" if not saturated else f"{which} at its range", "none"
-        ),
-        judge_bound("temperature", COLDEST < warmth < HOTTEST, f"{warmth:.1f} C", f"{COLDEST:g}..{HOTTEST:g}"),
     ]
 
 
