@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 import datetime
 import json
-import re
 import math
 import queue
+import re
 import shutil
 import signal
 import socket
