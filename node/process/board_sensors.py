@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -16,11 +17,13 @@ from node.process.board_findings import BoardFinding, bad_finding, good_finding
 from node.process.drivers.gravity_witness import FARTHEST, G
 from node.process.drivers.source import EncoderSource, ImuSample, ImuSource
 from node.process.temperature_watch import COLDEST, HOTTEST
+from telemetry.records.noise_file import GyroNoise
 
 CYCLES: Final = 8
 RATE_OFF: Final = 0.05  # of the rate of the frames that the driver has set
 USUAL_NOISE: Final = math.radians(0.015)  # rad/s, of a cycle's mean: the default noise over a cycle and a half
 NOISIEST: Final = 10.0  # times that
+BESIDE: Final = 3.0  # times the noise of a sensor's own record; of seven cycles and three axes chance makes less than 2
 LARGEST_BIAS: Final = math.radians(20.0)  # rad/s, of any part that is sold
 TURN_OFF: Final = 0.1  # of the turn that is told
 COUNTS: Final = 4096  # of a turn
@@ -30,9 +33,9 @@ Sleep = Callable[[float], None]
 
 
 def check_imu(
-    source: ImuSource, noise: float = 1.0, clock: Clock = time.monotonic, sleep: Sleep = time.sleep
+    source: ImuSource, known: GyroNoise | None = None, clock: Clock = time.monotonic, sleep: Sleep = time.sleep
 ) -> list[BoardFinding]:
-    """Findings of an IMU at rest; ``noise`` is its noise in that of the node's configuration."""
+    """Findings of an IMU at rest; ``known`` is the noise of its record, where there is one."""
     try:
         source.start()
     except SensorError as error:
@@ -54,7 +57,7 @@ def check_imu(
         else good_finding("readings", f"{CYCLES} cycles of {PERIOD:.3f} s, none lost")
     )
     found += judge_rate(source)
-    return found + (judge_readings(samples[1:], noise) if len(samples) > 2 else [])
+    return found + (judge_readings(samples[1:], expected_noise(1.0, known)) if len(samples) > 2 else [])
 
 
 def describe_source(source: ImuSource | EncoderSource) -> str:
@@ -68,13 +71,31 @@ def judge_rate(source: ImuSource) -> list[BoardFinding]:
     if told is None or not math.isfinite(counted):
         return []
     text = f"{counted:.1f} Hz, set to {told:.1f}"
+    if math.isfinite(jitter := getattr(source, "jitter", math.nan)):
+        text = f"{text}, jitter {1e3 * jitter:.2f} ms"
     return [good_finding("rate", text) if abs(counted / told - 1.0) < RATE_OFF else bad_finding("rate", text)]
 
 
+@dataclass(frozen=True, slots=True)
+class ExpectedNoise:
+    """Largest scatter (rad/s) of the mean rates of cycles at rest, and that of its own record where there is one."""
+
+    most: float
+    own: float = math.nan
+
+
+def expected_noise(factor: float, known: GyroNoise | None) -> ExpectedNoise:
+    """Of a sensor with so many times the noise of the node's configuration, or with that of its own record."""
+    if known is None:
+        return ExpectedNoise(NOISIEST * factor * USUAL_NOISE)
+    own = factor * max(known.white) / math.sqrt(PERIOD)
+    return ExpectedNoise(BESIDE * own, own)
+
+
 def judge_readings(
-    samples: Sequence[ImuSample | ImuReading], noise: float, *, still: bool = True
+    samples: Sequence[ImuSample | ImuReading], noise: ExpectedNoise, *, still: bool = True
 ) -> list[BoardFinding]:
-    """Findings of three readings or more of a sensor with a noise in that of the node's configuration.
+    """Findings of three readings or more of a sensor.
 
     Noise, bias and gravity are judged at rest (``still``) alone; a sensor that repeats itself is found always.
     """
@@ -99,16 +120,14 @@ def judge_readings(
     ]
 
 
-def _rest_findings(spread: Array, bias: Array, force: float, noise: float) -> list[BoardFinding]:
+def _rest_findings(spread: Array, bias: Array, force: float, noise: ExpectedNoise) -> list[BoardFinding]:
     """What only a rest shows, noise first: scatter (3,) and mean (3,) of the rates, and the size of the mean force."""
-    most, largest = NOISIEST * noise * USUAL_NOISE, float(spread.max())
+    largest = float(spread.max())
+    text = f"{math.degrees(largest):.4f} deg/s of a cycle at rest"
+    if math.isfinite(noise.own):
+        text = f"{text}, {math.degrees(noise.own):.4f} by its record"
     return [
-        judge_bound(
-            "noise",
-            largest <= most,
-            f"{math.degrees(largest):.4f} deg/s of a cycle at rest",
-            f"at most {math.degrees(most):.3f}",
-        ),
+        judge_bound("noise", largest <= noise.most, text, f"at most {math.degrees(noise.most):.3f}"),
         judge_bound(
             "bias",
             float(np.abs(bias).max()) <= LARGEST_BIAS,

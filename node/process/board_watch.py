@@ -18,7 +18,7 @@ from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.jit import folder_in_use
 from node.process import board_places
 from node.process.board_findings import BoardFinding, bad_finding, good_finding
-from node.process.board_sensors import CYCLES, describe_source, judge_rate, judge_readings
+from node.process.board_sensors import CYCLES, describe_source, expected_noise, judge_rate, judge_readings
 from node.process.drivers.source import SafeImu
 from telemetry.errors import MediumError
 from telemetry.messages import Side
@@ -86,7 +86,8 @@ class BoardWatch:
             found += judge_rate(own.source)
         if len(samples) < FEWEST:
             return found
-        return found + judge_readings(samples, self._settings.imus[imu].noise, still=all(self._stood))
+        noise = expected_noise(self._settings.imus[imu].noise, self._settings.gyro_noise)
+        return found + judge_readings(samples, noise, still=all(self._stood))
 
 
 def worst_of(findings: Sequence[Sequence[BoardFinding]]) -> list[BoardFinding]:

@@ -22,6 +22,7 @@ from telemetry.application.commands import find_command
 from telemetry.frozen import replace
 from telemetry.messages import Command, Reply, Side
 from telemetry.presentation.msgpack_codec import decode_message, encode_message
+from telemetry.records.noise_file import GyroNoise
 
 pytestmark = pytest.mark.slow
 SPEC = find_command("check_board")
@@ -157,3 +158,20 @@ def test_a_node_that_has_just_started_says_that_no_reading_came(tmp_path: Path) 
     found = {line.part: line for line in watch_of(tmp_path).findings(datetime.datetime.now(datetime.UTC))}
     assert (found["readings"].good, found["readings"].text) == (False, "0 of the last 0 cycles")
     assert "noise" not in found
+
+
+def test_noise_is_judged_beside_that_of_the_sensor_s_own_record(tmp_path: Path) -> None:
+    """0.01 deg/s/sqrt(Hz) is 0.0138 deg/s of a cycle; four times that is told, though cheap parts have it."""
+    white = np.radians([0.01, 0.008, 0.009])
+    wx, wy, wz = white.tolist()
+    known = GyroNoise((wx, wy, wz), (1e-6, 1e-6, 1e-6), (100.0, 100.0, 100.0))
+    for times, good in ((1.0, True), (4.5, False)):
+        watch = BoardWatch(TubeSettings(1, gyro_noise=known), (), BoardPlaces(tmp_path))
+        random = np.random.default_rng(5)
+        for _ in range(8):
+            x, y, z = (times * white / np.sqrt(PERIOD) * random.standard_normal(3)).tolist()
+            watch.look(ImuReading(0.0, PERIOD, (x, y, z), (x, y, z - 9.8)), still=True)
+        found = {line.part: line for line in watch.findings(datetime.datetime.now(datetime.UTC))}
+        assert found["noise"].good == good
+        assert found["noise"].text.endswith(" deg/s of a cycle at rest, 0.0138 by its record")
+        assert found["noise"].text.startswith("expected at most 0.041, got ") != good

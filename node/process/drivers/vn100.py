@@ -39,6 +39,11 @@ class Vn100:
         self._fresh = True
         self.dropped = 0  # lines that were cut or damaged
 
+    @property
+    def description(self) -> str:
+        """What it is."""
+        return f"vn100 at {self._path}, {RATE} Hz"
+
     def start(self) -> None:
         """Open the line and ask for its measurements."""
         self.close()
