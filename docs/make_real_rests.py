@@ -1,12 +1,17 @@
-"""Calibrate the real sensors of ``tests/data/records`` from their rests: ``python docs/make_real_rests.py``, 5 s.
+"""Calibrate the real sensors of ``tests/data/records`` from their rests: ``python docs/make_real_rests.py``, 15 s.
 
-Writes ``results/rests.csv``: how wrong each reads gravity and turns, before and after, and where a fit did not look.
+Writes ``results/rests.csv``: how wrong each reads gravity and turns, before and after, and where a fit did not look;
+and the pictures of ``first-sensor.md``, by its own commands.
 """
 
 from __future__ import annotations
 
 import csv
+import re
+import shlex
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -39,9 +44,20 @@ def row_of(name: str) -> dict[str, str | int]:
     }
 
 
+def draw_pictures() -> None:
+    """Run the commands of the page that draw, and keep what they drew."""
+    page = (DOCS / "first-sensor.md").read_text(encoding="utf-8")
+    with tempfile.TemporaryDirectory() as folder:
+        for line in re.findall(r"^    borechain (calibrate .* --plot .*)$", page, re.MULTILINE):
+            words = [str(DOCS.parent / word) if word.startswith("tests/") else word for word in shlex.split(line)]
+            subprocess.run([sys.executable, "-m", "borechain", *words], cwd=folder, check=True, capture_output=True)
+            (drawn := Path(folder, words[-1])).replace(DOCS / f"first-sensor-{drawn.name}")
+
+
 if __name__ == "__main__":
     rows = [row_of(name) for name in SENSORS]
     with (DOCS / "results" / "rests.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
+    draw_pictures()

@@ -273,8 +273,8 @@ def test_a_tube_obeys_an_added_command_and_its_ranges_hold(copy: Path) -> None:
 
         given = parse_parameters(find_command("blink"), {"tube": "3", "times": "2"})
         with tempfile.TemporaryDirectory() as folder:
-            tube = TubeProcess(TubeSettings(3), pathlib.Path(folder)).tube
-            handlers = CommandHandlers(tube, None, lambda first, last: (0, 0))
+            process = TubeProcess(TubeSettings(3), pathlib.Path(folder))
+            handlers = CommandHandlers(process.tube, None, lambda first, last: (0, 0), process._board)
             for sequence, arguments in enumerate((given, {"times": 10}, {})):
                 reply = handlers.obey(Command(3, sequence, "blink", arguments))
                 print(reply.done, reply.detail, reply.values, sep="|")

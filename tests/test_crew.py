@@ -18,6 +18,8 @@ from borechain.crew import screen_panels
 from borechain.crew.app import CrewApp
 from borechain.crew.picture import Picture, View
 from borechain.crew.setup_panel import parse_order
+from node.firmware.tube_settings import TubeSettings
+from node.process.tube_process import TubeProcess
 
 pytestmark = pytest.mark.slow
 
@@ -343,6 +345,28 @@ async def test_north_is_missed_on_the_setup_panel_told_in_a_line_and_taken_back(
             await until(app, served, lambda text: "NOT READY TO DRILL, not told: north" in text, speaks_of(3))
             await pilot.press("o", *"what", "escape", "u")
             await until(app, served, lambda text: "of the tolerance" in text, speaks_of(3))
+
+
+async def test_a_board_is_checked_from_the_screen_and_what_is_wrong_stands_first(tmp_path: Path) -> None:
+    rig = Rig(tmp_path / "ground", target=20.0)
+    rig.obey = TubeProcess(TubeSettings(1), tmp_path / "tube")._commands.obey  # a board without a reading yet
+    rig.run(5.0)
+    rig.drill(1, 0.3)
+    with serving(rig) as served, connect_to_ground(served.endpoint, timeout=10.0) as ground:
+        app = CrewApp(ground, "rig-1", "anna", Clock())
+        async with app.run_test(size=SIZE) as pilot:
+            await until(app, served, lambda text: "tubes 1" in text, speaks_of(1))
+            await pilot.press("o", *"check_board tube=1", "enter")
+            text = await until(app, served, lambda text: "[esc] back" in text, speaks_of(1))
+            lines = [line.rstrip() for line in text.splitlines()]
+            assert len(lines) <= SIZE[1]
+            head = next(place for place, line in enumerate(lines) if "[esc] back" in line)
+            assert lines[head].startswith("check_board tube=1: done: wrong: readings")
+            assert lines[head + 1] == "readings: 0 of the last 0 cycles"
+            assert "disk: " in text
+            assert "of the tolerance" not in text
+            await pilot.press("escape")
+            await until(app, served, lambda text: "of the tolerance" in text, speaks_of(1))
 
 
 async def test_what_the_tubes_say_opens_with_one_key_and_names_a_sensor_that_stepped(tmp_path: Path) -> None:

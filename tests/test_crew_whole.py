@@ -10,6 +10,7 @@ from rich.text import Text
 
 from borechain.crew.checks_panel import checks_panel
 from borechain.crew.picture import Picture
+from borechain.crew.reply_panel import reply_panel
 from borechain.crew.screen_panels import (
     actions_panel,
     alarms_panel,
@@ -359,3 +360,23 @@ def test_what_is_wrong_with_a_hole_comes_first(is_doubt: bool, style: str, rows:
     ]  # fmt: skip
     assert styles(found)[:4] == [style, rows, "bright_black", "bold"]
     assert lines(found)[4] == "next stop: turn the string by 90 deg"
+
+
+def test_a_reply_has_what_is_wrong_first_and_never_more_than_its_lines() -> None:
+    values = {
+        "good": False, "wrong": "noise, disk", "sensor": "mpu6500 at 0x68, 50.0 Hz", "noise": "n " * 50, "disk": "full"
+    }  # fmt: skip
+    text = reply_panel("check_board tube=3: done", values)
+    assert lines(text) == [
+        "check_board tube=3: done    [esc] back",
+        f"noise: {'n ' * 36}n",
+        f"  {'n ' * 12}n",
+        "disk: full",
+        "good: no; sensor: mpu6500 at 0x68, 50.0 Hz",
+    ]
+    assert styles(text) == ["bold", "bold red", "bold red", "bold red", ""]
+    numbers = {f"stage_{k}": k / 3.0 for k in range(60)}
+    found = lines(reply_panel("timing tube=3: done", numbers))
+    assert len(found) == 11
+    assert "stage_4: 1.33333" in found[1]
+    assert found[-1] == "and 5 lines more"

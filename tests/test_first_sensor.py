@@ -13,6 +13,7 @@ from node.process.cluster_options import own_corrections
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[1]
+WRITTEN = (".json", ".svg")
 PAGE = (ROOT / "docs" / "first-sensor.md").read_text()
 
 
@@ -21,7 +22,7 @@ def words_of(command: str, folder: Path) -> list[str]:
     (line,) = re.findall(rf"^    borechain ({command} .*)$", PAGE, re.MULTILINE)
     words = shlex.split(line)
     return [
-        str(ROOT / word) if word.startswith("tests/") else str(folder / word) if word.endswith(".json") else word
+        str(ROOT / word) if word.startswith("tests/") else str(folder / word) if word.endswith(WRITTEN) else word
         for word in words
     ]
 
@@ -43,6 +44,12 @@ def test_both_sensors_come_out_as_the_page_says_and_a_node_takes_them(tmp_path: 
     angles = [f"{judged['left_out_rms_deg']:.2f}", f"{judged['uncalibrated_rms_deg']:.1f}"]
     says = "Gravity was read {} m/s2 wrong and is {} after, {} at rests .* come out to {} deg instead of {}\\."
     assert re.search(says.format(*map(re.escape, [*sizes, *angles])), PAGE, re.DOTALL), (sizes, angles)
+    applied = run(*words_of("calibrate apply", tmp_path))
+    assert applied.returncode == 0, applied.stderr
+    for drawn in ("rests.svg", "both.svg"):
+        assert f"](first-sensor-{drawn})" in PAGE
+        kept, made = (ROOT / "docs" / f"first-sensor-{drawn}").read_text(), (tmp_path / drawn).read_text()
+        assert sorted(re.findall(r'<g id="([a-z_0-9]+)"', kept)) == sorted(re.findall(r'<g id="([a-z_0-9]+)"', made))
     for sensor in ("gyroscope", "accelerometer"):
         (taken,) = own_corrections(sensor, (tmp_path / f"{sensor}.json",), 1)
         assert taken.matrix[0][0] == pytest.approx(1.0, abs=0.02)

@@ -17,6 +17,7 @@ from borechain.client import ClientError
 from borechain.crew import screen_panels
 from borechain.crew.checks_panel import checks_panel
 from borechain.crew.picture import PATHS, Picture, View
+from borechain.crew.reply_panel import reply_panel
 from borechain.crew.setup_panel import parse_order, setup_panel
 from telemetry.errors import BorechainError
 
@@ -56,7 +57,7 @@ class CrewApp(App[None]):
     #verdict { height: 3; margin-bottom: 1; }
     #middle { height: 11; }
     #plan { width: 23; } #strip { width: 27; padding-left: 1; } #string { width: 30; padding-left: 1; }
-    #setup, #checks { height: 11; display: none; }
+    #setup, #checks, #reply { height: 11; display: none; }
     #alarms { height: 5; } #actions { height: 2; }
     #order { height: 1; border: none; padding: 0; display: none; }
     """
@@ -104,6 +105,7 @@ class CrewApp(App[None]):
             yield Static(id="string")
         yield Static(id="setup")
         yield Static(id="checks")
+        yield Static(id="reply")
         yield Static(id="alarms")
         yield Static(id="actions")
         yield Input(
@@ -189,7 +191,7 @@ class CrewApp(App[None]):
     def _show(self, name: str) -> None:
         """Show one of the panels in the middle of the screen; what is there already gives way to the first."""
         name = "#middle" if self.query_one(name).display else name
-        for panel in ("#middle", "#setup", "#checks"):
+        for panel in ("#middle", "#setup", "#checks", "#reply"):
             self.query_one(panel).display = panel == name
 
     def action_type_order(self) -> None:
@@ -198,8 +200,10 @@ class CrewApp(App[None]):
         self.query_one("#order", Input).focus()
 
     def action_leave_order(self) -> None:
-        """Close the line without an order."""
+        """Close the line without an order, and the reply to one."""
         self._open_order(is_open=False)
+        if self.query_one("#reply").display:
+            self._show("#reply")
 
     def on_input_submitted(self, typed: Input.Submitted) -> None:
         """Carry the typed order out."""
@@ -236,11 +240,20 @@ class CrewApp(App[None]):
                 order = self._source.order(name, self._by, **parameters)
                 detail = f": {order.detail}" if order.detail else ""
                 outcome = f"{shown}: {order.state}{detail}"
+                if order.tube is not None and order.values:
+                    self.call_from_thread(self._show_reply, outcome, order.values)
             except BorechainError as error:
                 outcome = f"{shown}: {error}"
             self.call_from_thread(self._tell, outcome)
 
         self.run_worker(carry_out, thread=True)
+
+    def _show_reply(self, outcome: str, values: View) -> None:
+        """Show what a tube has answered in place of plan, strip and string."""
+        panel = self.query_one("#reply", Static)
+        panel.update(reply_panel(outcome, values))
+        if not panel.display:
+            self._show("#reply")
 
     def _tell(self, line: str) -> None:
         self.picture.done.append(line)

@@ -22,10 +22,10 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-FEWEST: Final = 8  # degrees of freedom; of fewer, chance and a walk look alike
+FEWEST: Final = 3  # degrees of freedom; Student's intervals of fewer hold whatever walks
 AGAINST: Final = 1.0  # of a walk's step over the noise: what the test is most powerful against
-WALKS: Final = (0.0, 0.25, 0.5, 1.0, 2.0)  # the same, of which an interval is the mean
-BELIEVED: Final = (0.5, 0.125, 0.125, 0.125, 0.125)  # in each, before any residual is seen
+WALKS: Final = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0)  # the same, of which an interval is the mean
+BELIEVED: Final = (0.1, 0.1, 0.2, 0.2, 0.2, 0.2)  # in each, before any residual is seen: sensors' biases do wander
 CHANCE: Final = 0.01  # of an honest record to be taken for one that walks
 DRAWS: Final = 2_000_000  # of noise on one direction, for the limit of the test
 FEWEST_DRAWS, MOST_DRAWS = 2000, 20_000  # records of those

@@ -94,7 +94,7 @@ def draw_series(part: Figure | SubFigure, series: AppliedSeries) -> None:
         for readings, name, colour in ((series.before, "before", BEFORE), (series.after, "after", AFTER)):
             axes.plot(series.times, readings[:, k], color=colour, lw=0.7, label=name)
         axes.set(xlabel="time, s", ylabel=f"{AXES[k]}, {SERIES_UNITS[series.sensor]}")
-    axes.legend()
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.1)
 
 
 def before_after(part: Figure | SubFigure, names: Sequence[str], pairs: Sequence[tuple[str, Array, Array]]) -> None:

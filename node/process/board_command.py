@@ -17,6 +17,7 @@ from telemetry.runtime.typed_options import gather_options
 
 if TYPE_CHECKING:
     from node.process.board_findings import BoardFinding
+    from telemetry.records.noise_file import GyroNoise
 
 NOT_GOOD = 1  # exit status
 LOOK_S = 0.1  # from one reading of the count to the next while the head is turned by hand
@@ -28,6 +29,7 @@ class BoardRequest:
 
     tube: int
     imus: tuple[str, ...]
+    gyro_noise: Path | None
     counter: str | None
     turn_deg: float | None
     interfaces: tuple[str, ...]
@@ -39,9 +41,11 @@ class BoardRequest:
         """A line of every part, in the order of the options."""
         from node.kernels.arithmetic.jit import folder_in_use
         from node.process import board_places as places
+        from telemetry.records.noise_file import read_gyro_noise
 
         now = datetime.datetime.now(datetime.UTC)
-        found = [line for text in self.imus for line in imu_findings(text)]
+        known = None if self.gyro_noise is None else read_gyro_noise(self.gyro_noise)
+        found = [line for text in self.imus for line in imu_findings(text, known)]
         if self.counter is not None:
             found += encoder_findings(self.counter, self.turn_deg)
         found += [places.check_can(f"can {name}", name, is_fd=not self.is_classic) for name in self.interfaces]
@@ -51,8 +55,8 @@ class BoardRequest:
         return [*found, places.check_kernels(folder_in_use())]
 
 
-def imu_findings(text: str) -> list[BoardFinding]:
-    """Findings of one IMU by its name."""
+def imu_findings(text: str, known: GyroNoise | None) -> list[BoardFinding]:
+    """Findings of one IMU by its name, with the noise of its record where there is one."""
     from node.process.board_sensors import check_imu
     from node.process.drivers.choice import imu_source
     from node.process.drivers.mpu_chips import CHIPS
@@ -61,7 +65,7 @@ def imu_findings(text: str) -> list[BoardFinding]:
         check_installed("smbus2")
     source = imu_source(text)
     try:
-        return check_imu(source)
+        return check_imu(source, known)
     finally:
         source.close()
 
@@ -101,6 +105,11 @@ def board() -> None:
 @gather_options(
     click.option("--tube", type=int, default=0, show_default=True, help="Number of its tube; 0 is the encoder."),
     click.option("--imu", "imus", multiple=True, help="Its IMU, as borechain node takes it. Repeat for several."),
+    click.option(
+        "--gyro-noise",
+        type=click.Path(path_type=Path, dir_okay=False),
+        help="File of borechain allan --out: its noise is judged beside that.",
+    ),
     click.option("--counter", help="Its encoder, as borechain encoder takes it."),
     click.option("--turn-deg", type=float, help="Turn the head by this, forward, when asked: direction and count."),
     click.option("--can", "interfaces", multiple=True, help="A CAN interface, such as can0. Repeat for both."),

@@ -26,14 +26,14 @@ TIME_LIMIT: Final = 10.0  # s, of a program
 SOON: Final = datetime.timedelta(days=14)
 
 
-def check_can(part: str, interface: str, *, is_fd: bool = True) -> BoardFinding:
-    """One CAN controller: up, active, with the bit rates of our units, few errors."""
+def check_can(part: str, interface: str, *, is_fd: bool = True, limit: float = TIME_LIMIT) -> BoardFinding:
+    """One CAN controller: up, active, with the bit rates of our units, few errors; ``limit`` (s) of the program."""
     try:
         done = subprocess.run(
             ["ip", "-json", "-details", "link", "show", interface],
             capture_output=True,
             text=True,
-            timeout=TIME_LIMIT,
+            timeout=limit,
             check=False,
         )
         rows: list[dict[str, Any]] = json.loads(done.stdout) if done.returncode == 0 else []

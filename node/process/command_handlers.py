@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from node.firmware.tube import Tube
+from node.process.board_watch import BoardWatch
 from telemetry.application.arguments import check_arguments
-from telemetry.application.commands import COMMANDS, ObeyedBy
+from telemetry.application.commands import COMMANDS, LONGEST_FINDING, ObeyedBy
 from telemetry.errors import CommandError
 from telemetry.messages import Command, Reply, Value
 from telemetry.quantities import MAX_TEXT
@@ -34,10 +36,18 @@ class CommandHandlers:
     tube : firmware of the node
     timing : where the node's own clock keeps its measurements; None in a stepped process
     resend : sends the surveys of a range of numbers again; returns how many, and from which number all are kept
+    board : what is found of the board
     """
 
-    def __init__(self, tube: Tube, timing: CycleTiming | None, resend: Callable[[int, int], tuple[int, int]]) -> None:
+    def __init__(
+        self,
+        tube: Tube,
+        timing: CycleTiming | None,
+        resend: Callable[[int, int], tuple[int, int]],
+        board: BoardWatch,
+    ) -> None:
         self._tube = tube
+        self._board = board
         self._resend = resend
         self._timing = timing
         self._handlers: dict[str, Callable[[Mapping[str, Any], int], CommandOutcome]] = {
@@ -104,3 +114,11 @@ class CommandHandlers:
             if durations.count:
                 values |= {f"{stage.value}_p99": durations.quantile(0.99), f"{stage.value}_max": durations.largest}
         return CommandOutcome(True, values=values)
+
+    def check_board(self, _arguments: Mapping[str, Any], _sequence: int) -> CommandOutcome:
+        """Say of each part of the board whether it is as it should be."""
+        found = self._board.findings(datetime.datetime.now(datetime.UTC))
+        wrong = ", ".join(line.part for line in found if not line.good)
+        values: dict[str, Value] = {"good": not wrong, "wrong": wrong}
+        values |= {line.part: line.text[:LONGEST_FINDING] for line in found}
+        return CommandOutcome(True, f"wrong: {wrong}" if wrong else f"all {len(found)} parts are good", values)

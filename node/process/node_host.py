@@ -12,6 +12,7 @@ from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.compiler import leave_blas_out
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.step.precompile import warm_encoder, warm_step
+from node.process.board_watch import BoardPlaces
 from node.process.drivers.replay_drivers import ReplayImu
 from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.drivers.timed import TimedImu
@@ -44,7 +45,8 @@ def run_node(
     seals = seals_at(place.keys, settings.tube, settings.reach, place.rig)
 
     def build(timing: CycleTiming | None = None) -> TubeProcess:
-        process = TubeProcess(settings, place.folder, key=key, imus=imus, timing=timing, seals=seals)
+        board = BoardPlaces(place.folder, place.keys, place.media, has_clock=own_time is not None)
+        process = TubeProcess(settings, place.folder, key=key, imus=imus, timing=timing, seals=seals, places=board)
         for imu in imus:
             if isinstance(imu, ReplayImu | TimedImu) and imu.understood:
                 write_warning(name, imu.understood)

@@ -24,6 +24,7 @@ from node.kernels.record.sensor_record import new_mount
 from node.process.bias_search import BiasSearch
 from node.process.block_store import BlockStore
 from node.process.block_updater import BlockUpdater, load_parameters
+from node.process.board_watch import BoardPlaces, BoardWatch
 from node.process.command_handlers import CommandHandlers
 from node.process.counter import BootCounter
 from node.process.drivers.source import ImuSource, SafeImu
@@ -81,6 +82,7 @@ class TubeProcess(Process):
     timing : durations of its cycles with an own clock; None where it is stepped
     disk : that holds the folder
     seals : what it says and believes under keys; None: everybody is believed
+    places : what its board has beside the sensors; None: its folder
 
     Raises
     ------
@@ -98,6 +100,7 @@ class TubeProcess(Process):
         timing: CycleTiming | None = None,
         disk: Disk = MACHINE,
         seals: Seals | None = None,
+        places: BoardPlaces | None = None,
     ) -> None:
         self.settings = settings
         self._timing = timing
@@ -155,7 +158,8 @@ class TubeProcess(Process):
         if self._range.watched:
             doubt_bias(self.state[0], 0, 0.0)  # compiled before the first cycle
         self._search = BiasSearch(self._send_event)
-        self._commands = CommandHandlers(self.tube, timing, self._resend)
+        self._board = BoardWatch(settings, self._imus, places or BoardPlaces(folder))
+        self._commands = CommandHandlers(self.tube, timing, self._resend, self._board)
         self._now = 0.0
         self._announced = False
         self._skipped = 0  # silent tubes above, as they were last told of
@@ -197,6 +201,7 @@ class TubeProcess(Process):
             start, samples = reading.start, [imu.read(reading.start, now) for imu in self._imus]
             first, *others = [reading_from(sample, start, now) for sample in samples]
             reading = replace(first, others=tuple(others))
+        self._board.look(reading, still=bool(self.state[0]["still_cycles"] > 0))
         reading = self._warmth.look(reading)
         self._range.look(reading, self.state[0], self.nodes[0]["config"])
         self._lap(CycleStage.READ)

@@ -101,6 +101,23 @@ SIGMA_M = _argument("sigma", NUMBER, "standard deviation", unit="m", low=1e-4, h
 FILE = "file of the folder `calibrations` without its `.json`, or `identity`"
 SHA256 = _result("sha256", TEXT, "hash of the parameter block in use")
 ONE_AN_IMU = "one an IMU"
+LONGEST_FINDING = 128  # characters of a part of a board, so that all of them are one payload
+BOARD_PARTS = (
+    ("sensor", "what it is"),
+    ("readings", "how many of the last cycles came"),
+    ("rate", "of its samples, counted beside set"),
+    ("noise", "at rest"),
+    ("bias", "at rest"),
+    ("gravity", "at rest"),
+    ("ranges", "readings at their range"),
+    ("temperature", "of the sensor"),
+    ("upper", "CAN controller of the upper end"),
+    ("lower", "CAN controller of the lower end"),
+    ("clock", "of the board"),
+    ("disk", "of its state, and the room left"),
+    ("keys", "generation, and until when it holds"),
+    ("kernels", "whether they are compiled"),
+)
 
 COMMANDS: tuple[CommandSpec, ...] = (
     CommandSpec("take_survey", ObeyedBy.TUBE, "measures its station again at the next settled cycle"),
@@ -117,6 +134,17 @@ COMMANDS: tuple[CommandSpec, ...] = (
         ObeyedBy.TUBE,
         "reports the parameter block in use",
         reply=(_result("version", INTEGER, "of the block in use, 0 is the identity", "1"), SHA256),
+    ),
+    CommandSpec(
+        "check_board",
+        ObeyedBy.TUBE,
+        "says of each part of its board whether it is as it should be, as `borechain board check` does; a part that it "
+        "does not have is left out",
+        reply=(
+            _result("good", ValueKind.BOOLEAN, "whether every part is"),
+            _result("wrong", TEXT, "names of the parts that are not, with commas"),
+            *(_result(part, TEXT, text) for part, text in BOARD_PARTS),
+        ),
     ),
     CommandSpec(
         "resend",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from groundstation.config import GroundConfig
 from groundstation.service.process.ground_process import GroundProcess
 from telemetry.application.depth_source import DepthSource
 from telemetry.application.endpoint import Endpoint
-from telemetry.messages import ImuMean, NodeFlag, NodeMode, NodeState, Side, SurveyMeasurement
+from telemetry.messages import Command, ImuMean, NodeFlag, NodeMode, NodeState, Reply, Side, SurveyMeasurement
 from telemetry.presentation.msgpack_codec import encode_message
 
 VAR = (0.0034**2) / 32
@@ -38,6 +39,7 @@ class Rig:
         self.hops: dict[int, int] = {}  # as each tube has told them last
         self.untold: dict[int, NodeFlag] = {}  # angles that the node of a tube was not told
         self.yaw, self.systematic_var = 0.0, 1e-8  # of every survey, rad and rad^2
+        self.obey: Callable[[Command], Reply] | None = None  # what tube 1 does with an order
 
     md = 0.0
 
@@ -48,7 +50,9 @@ class Rig:
             self.ground.on_timer(self.now)
             for _ in range(3):
                 for _, frame in self.ground.take_frames(self.now):
-                    self.tube.receive(Side.UPPER, frame.payload, self.now)
+                    for received in self.tube.receive(Side.UPPER, frame.payload, self.now):
+                        if self.obey is not None and isinstance(received.message, Command):
+                            self.tube.mail.reply(self.obey(received.message))
                 for side, frame in self.tube.take_frames(self.now):
                     if side is Side.UPPER:
                         self.ground.on_frame(Side.LOWER, frame.payload, self.now)

@@ -167,7 +167,7 @@ def test_a_board_is_asked_for_the_kind_of_controller_that_was_told(
 
     monkeypatch.setattr(board_places, "check_can", check_can)
     for is_classic in (False, True):
-        BoardRequest(0, (), None, None, ("can0", "can1"), is_classic, tmp_path, None).findings()
+        BoardRequest(0, (), None, None, None, ("can0", "can1"), is_classic, tmp_path, None).findings()
     assert asked == [("can0", True), ("can1", True), ("can0", False), ("can1", False)]
 
 

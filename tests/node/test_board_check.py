@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 import json
 import math
 import os
@@ -13,99 +12,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from emulated_board import NOW, EmulatedBoard, can_with
 from emulated_encoders import EmulatedCounter
-from emulated_mpu import EmulatedMpu
 
-from borechain.pki.rig_keys import add_tube, init_rig
 from node.firmware.encoder_node import EncoderSample
-from node.process import board_places
 from node.process.board_command import board, is_turning
-from node.process.board_sensors import check_encoder, check_imu
-from node.process.drivers.mpu_imu import MpuImu
+from node.process.board_sensors import check_encoder
 from node.process.drivers.quadrature import QuadratureFile
-
-NOW = datetime.datetime(2026, 11, 27, 7, 0, tzinfo=datetime.UTC)
-GOOD_CAN = {
-    "ifname": "can0",
-    "flags": ["NOARP", "UP", "LOWER_UP", "ECHO"],
-    "link_type": "can",
-    "linkinfo": {
-        "info_kind": "can",
-        "info_data": {
-            "ctrlmode": ["FD"],
-            "state": "ERROR-ACTIVE",
-            "berr_counter": {"tx": 0, "rx": 3},
-            "bittiming": {"bitrate": 500000},
-            "data_bittiming": {"bitrate": 2000000},
-        },
-    },
-}
-
-
-class Board:
-    """A board whose parts are emulated; time is that of its sensor."""
-
-    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.folder, self.now, self.turn, self.halves = folder, 100.0, 90.0, 0
-        self.chip = EmulatedMpu()
-        self.driver = MpuImu(self.chip.connect, sleep=lambda _: None)
-        self.counter = EmulatedCounter(folder / "counters")
-        self.random = np.random.default_rng(3)
-        self.bias, self.force, self.noise, self.temperature = (
-            np.radians([0.5, -1.0, 0.2]),
-            1.0,
-            math.radians(0.05),
-            31.0,
-        )
-        self.quicker, self.step, self.stops_at = 1.0, 1, 10**9
-        self.can = json.loads(json.dumps(GOOD_CAN))
-        self.clock = NOW
-        self.keys = folder / "stick"
-        init_rig(self.keys, "rig-1", NOW)
-        add_tube(self.keys, 7, NOW)
-        add_tube(self.keys, 8, NOW)
-        self.key_place = self.keys / "tube-7.keys"
-        self.kernels = folder / "kernels"
-        (self.kernels / "node.kernels.step.node_step").mkdir(parents=True)
-        self.index = self.kernels / "node.kernels.step.node_step" / "node_step.node_step-9.py311.nbi"
-        self.index.touch()
-        self.programs = folder / "bin"
-        self.programs.mkdir()
-        monkeypatch.setenv("PATH", str(self.programs), prepend=":")
-
-    def sleep(self, seconds: float) -> None:
-        """Let the sensor live."""
-        self.now += seconds
-        for _ in range(26):
-            noise = self.random.normal(0.0, 1.0, 3)
-            rate = self.bias + self.noise * noise
-            force = self.force * (np.array([0.2, -0.3, -9.79]) + 15.0 * self.noise * noise)
-            self.chip.live(seconds * self.quicker / 26.0, tuple(rate), tuple(force), self.temperature)
-
-    def turn_head(self) -> bool:
-        """Turn on by a half; whether there is more to come."""
-        self.halves += 1
-        self.counter.turn_to(min(self.step * round(self.halves * self.turn * 2048 / 360.0), self.stops_at))
-        return self.halves < 2
-
-    def findings(self) -> dict[str, tuple[bool, str]]:
-        program = self.programs / "ip"
-        program.write_text(f"#!/bin/sh\ncat <<'END'\n{json.dumps([self.can] if self.can else [])}\nEND\n")
-        program.chmod(0o755)
-        lines = check_imu(self.driver, clock=lambda: self.now, sleep=self.sleep)
-        lines += check_encoder(QuadratureFile(self.counter.place / "count"), 90.0, lambda: self.now, self.turn_head)
-        lines += [board_places.check_can("can", "can0"), board_places.check_clock(self.clock)]
-        lines += [
-            board_places.check_disk(self.folder / "state"),
-            board_places.check_keys(self.key_place, 7, self.clock),
-        ]
-        lines += [board_places.check_kernels(self.kernels)]
-        return {line.part: (line.good, line.text) for line in lines}
 
 
 @pytest.fixture
-def emulated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Board:
-    return Board(tmp_path, monkeypatch)
+def emulated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> EmulatedBoard:
+    return EmulatedBoard(tmp_path, monkeypatch)
 
 
 PARTS = {
@@ -114,7 +32,7 @@ PARTS = {
 }  # fmt: skip
 
 
-def test_every_line_of_a_good_board_is_good(emulated: Board) -> None:
+def test_every_line_of_a_good_board_is_good(emulated: EmulatedBoard) -> None:
     found = emulated.findings()
     assert set(found) == PARTS
     assert {part: text for part, (good, text) in found.items() if not good} == {}
@@ -122,11 +40,7 @@ def test_every_line_of_a_good_board_is_good(emulated: Board) -> None:
     assert found["can"][1] == "can0: FD, 500000 bit/s"
 
 
-def can_with(**data: object) -> Callable[[Board], object]:
-    return lambda one: one.can["linkinfo"]["info_data"].update(data)
-
-
-FAULTS: list[tuple[str, Callable[[Board], object], str, str]] = [
+FAULTS: list[tuple[str, Callable[[EmulatedBoard], object], str, str]] = [
     ("no sensor", lambda one: setattr(one.chip, "absent", True), "sensor", "No such device"),
     ("another chip", lambda one: setattr(one.chip, "identity", 0x68), "sensor", "which is an mpu6050"),
     ("a deaf register", lambda one: one.chip.deaf.add(0x1C), "sensor", "register 0x1c: expected 0x10"),
@@ -166,7 +80,7 @@ FAULTS: list[tuple[str, Callable[[Board], object], str, str]] = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "break_it", "part", "says"), FAULTS, ids=[row[0] for row in FAULTS])
 def test_each_fault_is_named_in_the_line_of_its_part(
-    emulated: Board, name: str, break_it: Callable[[Board], object], part: str, says: str
+    emulated: EmulatedBoard, name: str, break_it: Callable[[EmulatedBoard], object], part: str, says: str
 ) -> None:
     break_it(emulated)
     found = emulated.findings()
@@ -181,7 +95,7 @@ def test_each_fault_is_named_in_the_line_of_its_part(
     assert wrong - {part} <= also.get(name, set())
 
 
-def test_keys_that_end_soon_are_named(emulated: Board) -> None:
+def test_keys_that_end_soon_are_named(emulated: EmulatedBoard) -> None:
     text = emulated.key_place.read_text()
     made = f"made_at = {NOW.isoformat()}"
     assert made in text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from emulated_iio import EmulatedDevice
 
 from node.errors import SensorError
+from node.process.board_sensors import check_imu
 from node.process.drivers.choice import imu_source
 from node.process.drivers.iio_imu import IioImu
 from node.process.drivers.replay_drivers import ReplayImu
@@ -144,3 +146,28 @@ def test_another_device_and_one_without_a_gyroscope_are_named(tmp_path: Path) ->
     with pytest.raises(SensorError, match="in_accel_scale: expected a number"):
         IioImu("bmp280", device.sysfs, device.devices).start()
     assert isinstance(imu_source("iio:icm42688"), IioImu)
+
+
+def test_a_check_of_a_board_has_its_rate_and_jitter_by_its_stamps(tmp_path: Path) -> None:
+    """Set to 100 Hz, a crystal that gives 104 with stamps that shake by half a millisecond."""
+    device, random = EmulatedDevice(tmp_path), np.random.default_rng(4)
+    source = IioImu("mpu6050", device.sysfs, device.devices)
+    now, sent = START, 0
+
+    def live(seconds: float) -> None:
+        nonlocal now, sent
+        count = int(104.0 * (now + seconds - START)) - sent
+        times = START + (sent + np.arange(count)) / 104.0 + 5e-4 * random.standard_normal(count)
+        sent += count
+        noise = 0.002 * random.standard_normal((count, 3))
+        device.live(times, noise, noise + np.array([0.3, -0.2, -9.79]))
+        now += seconds
+
+    found = {line.part: line for line in check_imu(source, clock=lambda: now, sleep=live)}
+    assert found["sensor"].text == "mpu6050 by the kernel's driver, 100.0 Hz"
+    shown = re.fullmatch(r"(\d+\.\d) Hz, set to 100\.0, jitter (\d\.\d\d) ms", found["rate"].text)
+    assert shown is not None
+    rate, jitter = shown.groups()
+    assert float(rate) == pytest.approx(104.0, abs=0.3)
+    assert float(jitter) == pytest.approx(0.5 * math.sqrt(2.0), abs=0.2)  # of a difference of two stamps
+    assert all(line.good for line in found.values())

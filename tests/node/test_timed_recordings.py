@@ -150,3 +150,27 @@ def test_a_recording_that_is_not_there_is_refused_before_anything_starts(tmp_pat
     for source in (imu_source, encoder_source):
         with pytest.raises(NodeConfigurationError, match=r"expected a recording, got .*none\.npy, which is not a file"):
             source(f"{kind}:{tmp_path / 'none.npy'}")
+
+
+def quickened(rate: float, steps: int) -> np.ndarray:
+    """Three seconds of rows at a rate, each the mean of w(t) = 4 (t - 101) since the row before."""
+    times = 100.0 + np.arange(steps) / rate
+    turned = 2.0 * (times - 101.0) ** 2
+    rows = np.column_stack([times, np.zeros((steps, 6))])
+    rows[1:, 3] = np.diff(turned) * rate
+    return rows
+
+
+def test_a_fast_record_tells_what_the_eighths_of_a_cycle_turned(tmp_path: Path) -> None:
+    """As a sensor with a FIFO does: of a rate that rises, each eighth has the rate of its own middle."""
+    source = imu_of(tmp_path, quickened(100.0, 300))
+    for begin, end in ((101.0, 101.53), (101.237, 101.75), (102.001, 102.3)):
+        sample = source.read(begin, end)
+        middles = begin + (end - begin) * (np.arange(8) + 0.5) / 8.0
+        assert sample.parts[0] == 0.0
+        assert sample.parts[1:] == pytest.approx(4.0 * (middles - 101.0), abs=2e-3)
+        assert np.mean(sample.parts[1:]) == pytest.approx(sample.rate[2], rel=1e-12)
+
+
+def test_a_record_of_few_rows_tells_no_eighths(tmp_path: Path) -> None:
+    assert imu_of(tmp_path, quickened(25.0, 75)).read(101.0, 101.5).parts == ()

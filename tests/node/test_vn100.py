@@ -65,6 +65,16 @@ def test_it_turns_by_what_a_record_of_its_samples_does(line: Line, tmp_path: Pat
     assert math.degrees(abs(turned - again - last)) < 0.01
 
 
+def test_it_tells_the_eighths_of_a_whole_cycle(line: Line) -> None:
+    """A head that starts in the middle of a cycle: four eighths at rest, four at 0.4 rad/s."""
+    source = started(line)
+    still, turns = (line_of(np.array([0.1, 0.0, rate]), np.array([0.0, 0.0, 9.8])) for rate in (0.0, 0.4))
+    line.send(still * 52)
+    assert source.read(0.0, 0.52).parts == ()  # what came before the first read is not known to be a cycle
+    line.send(still * 26 + turns * 26)
+    assert source.read(0.52, 1.04).parts == pytest.approx((0.0, *[0.0] * 4, *[0.4] * 4), abs=1e-9)
+
+
 def test_the_checksum_is_the_manual_s() -> None:
     assert line_checksum(b"VNRRG,8") == 0x4B
 

@@ -290,7 +290,13 @@ def test_an_order_to_a_silent_tube_holds_up_nobody(string: String, router: tuple
     assert (order["tube"], order["state"], order["done"]) == (1, "done", True)
     assert order["values"]["cycles"] > 0
     assert order["values"]["cycle_p99_s"] <= order["values"]["cycle_max_s"]
-    first, second = first_answer(bus, RIG, "orders", lambda answer: True)["orders"]
+    (reply,) = bus.get(f"{ordered}/check_board?tube=1", PATIENCE)
+    found = json.loads(reply.payload)["values"]
+    assert found["sensor"] == "TimedImu"
+    assert re.fullmatch(r"\d of the last \d cycles", found["readings"])
+    assert {"clock", "disk", "kernels"} <= found.keys()
+    assert found["good"] == (not found["wrong"])
+    first, second, _ = first_answer(bus, RIG, "orders", lambda answer: len(answer["orders"]) == 3)["orders"]
     assert (first["command"], first["tube"], first["state"]) == ("take_survey", 2, "sent")
     assert order == order | second  # the reply says when it was made besides
     string.end()

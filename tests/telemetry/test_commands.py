@@ -16,7 +16,7 @@ from telemetry.application.arguments import (
     shown_name,
     shown_values,
 )
-from telemetry.application.commands import COMMANDS, CommandSpec, ObeyedBy, find_command
+from telemetry.application.commands import COMMANDS, LONGEST_FINDING, CommandSpec, ObeyedBy, find_command
 from telemetry.errors import CommandError
 from telemetry.messages import Command, Reply
 from telemetry.presentation.msgpack_codec import MAX_PAYLOAD, decode_message, encode_message
@@ -130,3 +130,6 @@ def test_the_longest_reply_fits_one_payload() -> None:
     assert len(encode_message(Reply(250, 2**53, True, "", values))) < MAX_PAYLOAD // 4
     angles = dict.fromkeys(("pitch", "pitch_std", "roll", "roll_std"), (1.0,) * 16)
     assert len(encode_message(Reply(250, 2**53, True, "", {"method": "circle"} | angles))) < MAX_PAYLOAD // 4
+    board = {quantity.name: "w" * LONGEST_FINDING for quantity in find_command("check_board").reply}
+    said = Reply(250, 2**53, True, "d" * MAX_TEXT, board | {"good": False})
+    assert len(encode_message(said)) < MAX_PAYLOAD * 3 // 4

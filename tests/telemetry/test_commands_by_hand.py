@@ -16,8 +16,8 @@ ANGLE = ("number", "rad", -TURN, TURN, True, None)
 HEIGHT = ("number", "m", -20.0, 20.0, True, None)
 WORD = ("text", "", -math.inf, math.inf, True, None)
 TUBE: dict[str, dict[str, Any]] = {
-    "take_survey": {}, "parameters": {}, "alignment": {}, "timing": {}, "static_record": {"seconds": RECORD},
-    "resend": {"first": NUMBER, "last": NUMBER},
+    "take_survey": {}, "parameters": {}, "alignment": {}, "timing": {}, "check_board": {},
+    "static_record": {"seconds": RECORD}, "resend": {"first": NUMBER, "last": NUMBER},
     "align": {
         "method": ("text", "", -math.inf, math.inf, False, "circle"), "turns": ("number", "1", 1.0, 20.0, False, 2.0)
     },

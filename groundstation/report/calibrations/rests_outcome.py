@@ -69,8 +69,14 @@ def answer_rests(request: RestsRequest, day: str) -> CalibrationOutcome:
         "gyroscope_block_sha256": other.sha256() if other is not None else None,
     }
     sheet = rests_sheet(record, fit, turns, result)
+
+    def panels() -> Sequence[Any]:
+        from groundstation.report.rest_panels import rests_panels
+
+        return rests_panels(np.linalg.norm(means, axis=1) - request.gravity, fit, turns)
+
     return CalibrationOutcome(
-        result, to_json(block), block.sha256(), record.sha256, sheet, list[Any], to_json(other) if other else None
+        result, to_json(block), block.sha256(), record.sha256, sheet, panels, to_json(other) if other else None
     )
 
 

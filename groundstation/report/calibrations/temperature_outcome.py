@@ -89,7 +89,13 @@ def answer_temperature(request: TemperatureRequest, day: str) -> CalibrationOutc
         "block_sha256": block.sha256(),
     }
     sheet = temperature_sheet(fit, factor, request.unit, result)
-    return CalibrationOutcome(result, to_json(block), block.sha256(), record.sha256, sheet, list[Any])
+
+    def panels() -> Sequence[Any]:
+        from groundstation.report.rest_panels import warmth_panels
+
+        return warmth_panels(fit, record.temperature, request.unit)
+
+    return CalibrationOutcome(result, to_json(block), block.sha256(), record.sha256, sheet, panels)
 
 
 def read_warmed(path: Path, limit: float) -> WarmedRecord:

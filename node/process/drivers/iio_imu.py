@@ -86,6 +86,17 @@ class IioImu:
         self._rest = b""
         self._newest = np.nan  # s, stamp of the last frame that was read
         self._period = 1.0 / USUAL_RATE
+        self.counted_rate = self.jitter = np.nan  # Hz and s, of the stamps of the last whole cycle
+
+    @property
+    def sample_rate(self) -> float:
+        """Rate of the frames as it is set, Hz."""
+        return 1.0 / self._period
+
+    @property
+    def description(self) -> str:
+        """What it is."""
+        return f"{self._name} by the kernel's driver, {self.sample_rate:.1f} Hz"
 
     def start(self) -> None:
         """Find the device, set its channels and its clock, and begin to capture."""
@@ -144,6 +155,7 @@ class IioImu:
         sample = ImuSample((wx, wy, wz), (fx, fy, fz), warmth, saturated, late=end - self._newest)
         if not whole:
             return sample
+        self.counted_rate, self.jitter = float(1.0 / steps.mean()), float(steps.std())
         window = (self._newest - float(steps.sum()), self._newest)
         return replace(sample, parts=parts_of(values[2], window, begin, end))
 

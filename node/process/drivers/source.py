@@ -68,6 +68,7 @@ class SourceSupervisor:
         self._which: dict[str, Scalar] = {"imu": imu} if imu else {}
         self._told: set[SensorCause] = set()  # since it failed
         self._down = False
+        self.trouble = ""  # the newest fault; nothing once it is back
 
     def call(self, read: Callable[[], Sample], is_whole: Callable[[Sample], bool] = bool) -> Sample | None:
         """What ``read`` gives; None for this cycle when it fails. A source is back when it gives what ``is_whole``."""
@@ -84,10 +85,12 @@ class SourceSupervisor:
         if self._told and is_whole(sample):
             self._say(Severity.WARNING, f"{self._name}_back", self._which)
             self._told.clear()
+            self.trouble = ""
         return sample
 
     def tell(self, error: SensorError) -> None:
         """Report a fault, unless its cause was told since the source failed."""
+        self.trouble = str(error)
         if error.cause not in self._told:
             self._told.add(error.cause)
             details: dict[str, Scalar] = {"cause": str(error.cause), "detail": str(error)[:200]}
@@ -98,15 +101,20 @@ class SafeImu:
     """An IMU in use; during a fault its readings are NaN. ``imu`` is its number in a cluster, 0 if it is alone."""
 
     def __init__(self, source: ImuSource, say: Say, imu: int = 0) -> None:
-        self._source = source
+        self.source = source
         self._alarm = SourceSupervisor(source, say, "sensor", imu)
         self._gravity = GravityWitness()
+
+    @property
+    def trouble(self) -> str:
+        """Why its readings are lost; nothing while they come."""
+        return self._alarm.trouble
 
     def read(self, begin: float, end: float) -> ImuSample:
         """Mean over the cycle, whatever happens."""
 
         def read_proved() -> ImuSample:
-            sample = self._source.read(begin, end)
+            sample = self.source.read(begin, end)
             self._gravity.look(sample.rate, sample.force)
             return sample
 

@@ -10,12 +10,14 @@ from __future__ import annotations
 import contextlib
 import os
 import termios
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from node.errors import SensorError
+from node.process.drivers.fifo_window import parts_of
 from node.process.drivers.source import ImuSample
 from node.process.drivers.waiting_bytes import read_waiting
 
@@ -36,6 +38,11 @@ class Vn100:
         self._rest = b""
         self._fresh = True
         self.dropped = 0  # lines that were cut or damaged
+
+    @property
+    def description(self) -> str:
+        """What it is."""
+        return f"vn100 at {self._path}, {RATE} Hz"
 
     def start(self) -> None:
         """Open the line and ask for its measurements."""
@@ -67,7 +74,8 @@ class Vn100:
         fx, fy, fz, wx, wy, wz, warmth = values[:, 3:10].mean(axis=0).tolist()
         saturated = int(np.any(np.abs(values[:, 6:9]) >= LARGEST_RATE))
         saturated |= 2 * int(np.any(np.abs(values[:, 3:6]) >= LARGEST_FORCE))
-        return ImuSample((wx, wy, wz), (fx, fy, fz), warmth, saturated)
+        sample = ImuSample((wx, wy, wz), (fx, fy, fz), warmth, saturated)
+        return sample if fresh else replace(sample, parts=parts_of(values[:, 8], (begin, end), begin, end))
 
     def close(self) -> None:
         """Release the line."""

@@ -1,12 +1,18 @@
 """Bias and matrix over temperature."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.figure import Figure
 
 from groundstation.calibration import attitudes
 from groundstation.calibration.temperature import TemperatureModel, fit_temperature_polynomials, from_datasheet
+from groundstation.report.calibrations.calibration_answer import answer_calibration
+from groundstation.report.calibrations.calibration_request import TemperatureRequest
+from groundstation.report.figure_panels import render_panels
 from telemetry.errors import CalibrationError
 
 SIX = np.concatenate([np.eye(3), -np.eye(3)])
@@ -139,3 +145,23 @@ def test_degrees_and_covariances_that_are_none_are_refused() -> None:
         fit_temperature_polynomials(TRUTH, TRUTH, HELD, bias_degree=-1)
     with pytest.raises(CalibrationError, match="expected a positive definite"):
         fit_temperature_polynomials(TRUTH, TRUTH, HELD, covs=np.zeros((24, 3, 3)))
+
+
+def test_its_figure_shows_every_axis_and_every_residual(tmp_path: Path) -> None:
+    readings = read(MODEL, 9.8 * TRUTH, HELD) / 9.81
+    rows = [",".join(map(repr, row)) for row in np.column_stack([HELD, 9.8 * TRUTH, readings]).tolist()]
+    path = tmp_path / "oven.csv"
+    path.write_text("\n".join(["temperature_c,true_x,true_y,true_z,x,y,z", *rows]) + "\n")
+    curves, left = answer_calibration(TemperatureRequest(path, unit="m/s2", force=True), "2026-01-31").panels()
+    figure = Figure()
+    curves.draw(figure)
+    bias, scale = figure.axes
+    assert [line.get_ydata()[-1] for line in bias.lines[:3]] == pytest.approx(
+        [(MODEL.bias[0] + 35.0 * MODEL.bias[1] + 35.0**2 * MODEL.bias[2])[k] / 9.81 for k in range(3)]
+    )
+    by_definition = [100.0 * ((MODEL.matrix[0] + 35.0 * MODEL.matrix[1])[k, k] / 9.81 - 1.0) for k in range(3)]
+    assert [line.get_ydata()[-1] for line in scale.lines[:3]] == pytest.approx(by_definition, abs=1e-9)
+    other = Figure()
+    left.draw(other)
+    assert [len(line.get_xdata()) for line in other.axes[0].lines[1:]] == [24, 24, 24]
+    assert render_panels([curves, left], "svg").startswith(b"<?xml")
