@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from test_rig_seen_twice import joint
+from test_setup_seen_twice import joint
 
 from groundstation.config import GroundConfig
 from groundstation.service.alarms import verdict_doubts as room

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hand_fed import Rig
-from test_rig_seen_twice import joint
+from test_setup_seen_twice import joint
 
 from groundstation.config import GroundConfig
 from groundstation.errors import StoreError

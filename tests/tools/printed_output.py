@@ -7,7 +7,20 @@ import io
 import re
 from typing import Any
 
+from click.testing import CliRunner, Result
+
 from borechain.cli.survey.wall_command import SHOWN
+from telemetry.media.zenoh_bus import QueryReply
+
+
+def run_command(command: Any, *words: str) -> Result:
+    """Run a command in this process."""
+    return CliRunner().invoke(command, list(words))
+
+
+def query_reply(key: str, payload: bytes = b"", error: str | None = None) -> QueryReply:
+    """What came back from a key."""
+    return QueryReply(key=key, payload=payload, error=error)
 
 
 def printed(show: Any, *given: Any) -> list[str]:
