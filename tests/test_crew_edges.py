@@ -32,7 +32,7 @@ class Source:
     def order(self, name: str, by: str, **parameters: object) -> Any:
         assert by == "anna"
         self.ordered.append((name, parameters))
-        return SimpleNamespace(state="done", detail="")
+        return SimpleNamespace(state="done", detail="", tube=None, values={})
 
 
 @pytest.mark.parametrize("good_for", [None, 1.5, 30.0])

@@ -22,7 +22,8 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-FEWEST: Final = 3  # degrees of freedom; Student's intervals of fewer hold whatever walks
+FEWEST_JUDGED: Final = 8  # degrees of freedom; of fewer, chance and a walk look too much alike to refuse a record
+FEWEST_WIDENED: Final = 3  # the same; Student's intervals of fewer hold whatever walks
 AGAINST: Final = 1.0  # of a walk's step over the noise: what the test is most powerful against
 WALKS: Final = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0)  # the same, of which an interval is the mean
 BELIEVED: Final = (0.1, 0.1, 0.2, 0.2, 0.2, 0.2)  # in each, before any residual is seen: sensors' biases do wander
@@ -54,7 +55,7 @@ class _Design:
 
 def find_walk(truth: Array, residuals: Array) -> bool:
     """Whether residuals (n, 3) of a fit to truths (n, 3) go as those of a bias that walks."""
-    if len(truth) - 4 < FEWEST:
+    if len(truth) - 4 < FEWEST_JUDGED:
         return False
     design = _design_of(truth.tobytes())
     against = design.walks[WALKS.index(AGAINST)]
@@ -68,7 +69,7 @@ def walk_widening(truth: Array, residuals: Array) -> Array:
     ----------
     truth, residuals : (n, 3)
     """
-    if len(truth) - 4 < FEWEST or not float(np.sum(residuals**2)) > LEAST:
+    if len(truth) - 4 < FEWEST_WIDENED or not float(np.sum(residuals**2)) > LEAST:
         return np.ones((3, 4))
     design = _design_of(truth.tobytes())
     shown = (residuals.T @ design.directions) ** 2
