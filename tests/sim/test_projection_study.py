@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from groundstation.survey.path.curvature_prior import STATED
+from sim.studies.projection import drilled_holes
 from sim.studies.projection.drilled_holes import KINDS, LENGTH, DrilledGround, DrilledHole, drill_holes
 from sim.studies.projection.foreseen_ends import SPACING, STATIONS, foresee_ends
 from sim.studies.projection.run import run_study
@@ -147,3 +148,30 @@ def test_from_the_second_station_on_the_committed_chances_are_within_six_points(
     assert len(pairs) == 10
     assert all(abs(observed - stated) < 6.0 for stated, observed in pairs)
     assert np.mean([observed - stated for stated, observed in pairs]) == pytest.approx(0.0, abs=2.5)
+
+
+def forgotten_over(length: float) -> drilled_holes.Bend:
+    """Curvatures of 0.14 deg/m that wander, and are forgotten over a length (m)."""
+
+    def bend(random: np.random.Generator, _ground: DrilledGround, places: np.ndarray) -> np.ndarray:
+        kept = math.exp(-(places[1] - places[0]) / length)
+        news = 0.14 * random.normal(size=(len(places), 2))
+        found = news.copy()
+        for place in range(1, len(places)):
+            found[place] = kept * found[place - 1] + math.sqrt(1.0 - kept * kept) * news[place]
+        return found
+
+    return bend
+
+
+@pytest.mark.statistical
+@pytest.mark.parametrize("length", [10.0, 20.0, 40.0])
+def test_the_cone_holds_whatever_length_a_curvature_is_forgotten_over(
+    monkeypatch: pytest.MonkeyPatch, length: float
+) -> None:
+    """The ends of 200 holes, from every depth; the prior has 4, 12, 40 and 400 m."""
+    monkeypatch.setattr(drilled_holes, "KINDS", {"wanders": forgotten_over(length)})
+    holes = drill_holes(5, range(200), GROUND)
+    inside = np.array([foresee_ends(hole, 5, number).inside for number, hole in enumerate(holes)])
+    assert inside.mean() > 0.95
+    assert (inside.mean(axis=0) > 0.90).all()

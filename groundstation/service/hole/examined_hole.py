@@ -143,16 +143,21 @@ class ExaminedHole:
         return cost_blunders(self.examination)
 
     @cached_property
+    def chance(self) -> float:
+        """Of a false alarm of one test, so that a whole hole keeps its own."""
+        return chance_of_one(self.adjusted.looks, self.run)
+
+    @cached_property
     def last_look(self) -> LastLook | None:
         """What stands on the lowest tube's last look alone; None where another has read the last station too."""
-        return look_alone(self.adjusted, self.run, chance_of_one(self.adjusted.looks, self.run))
+        return look_alone(self.adjusted, self.run, self.chance)
 
     @cached_property
     def reliabilities(self) -> list[Reliability]:
         """How well what may go wrong with each tube at its newest stop, and with the string, would be found."""
         found, run = self.adjusted, self.run
-        possible, chance = possible_mistakes(found.looks, run), chance_of_one(found.looks, run)
-        return measure_reliability(found, run, possible, toe_weights(found), LARGEST, chance)
+        possible = possible_mistakes(found.looks, run)
+        return measure_reliability(found, run, possible, toe_weights(found), LARGEST, self.chance)
 
 
 def std_across(variances: Array) -> float:
