@@ -142,9 +142,26 @@ def test_all_is_every_extra_of_an_installation(wheel: Path) -> None:
     asked = [Requirement(text) for text in requirements(wheel)]
     parts = {
         extra: {r.name for r in asked if r.marker is not None and r.marker.evaluate({"extra": extra})}
-        for extra in ("all", "board", "campaign", "can", "files", "ground", "postgresql")
+        for extra in ("all", "board", "campaign", "can", "files", "ground", "page", "postgresql")
     }
     assert parts.pop("all") == set().union(*parts.values())
+    assert parts["page"] < parts["ground"]
+
+
+def test_a_live_page_needs_nothing_beyond_its_extra() -> None:
+    """What a demonstration's processes import, with all that only another extra brings out of the way."""
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        extras = tomllib.load(file)["project"]["optional-dependencies"]
+    brought = {Requirement(text).name for text in extras["page"]}
+    others = {Requirement(text).name for extra in ("all", "dev") for text in extras[extra]} - brought
+    program = f"""
+import sys
+sys.modules.update(dict.fromkeys({sorted(name.replace("-", "_") for name in others)!r}))
+import borechain.cli.rig.demo, borechain.drilling.rig_processes, groundstation.ground_host
+import groundstation.gateway.page.application, groundstation.gateway.page.server
+"""
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
 
 
 def test_a_wheel_holds_its_data_and_its_types(wheel: Path) -> None:
