@@ -160,6 +160,7 @@ def test_what_was_found_of_a_rig_is_a_fact_of_its_sheet() -> None:
         forced=("gate one", "gate two"), widened=1.25,
     )  # fmt: skip
     outcome = linear_outcome(job, "2026-02-03", 21.5, {"yaw_deg": 1.23456, "yaw_std_deg": 0.06789})
+    assert outcome.sheet.title == "Calibration of accelerometer"
     assert list(outcome.sheet.facts[:6]) == [
         ("Method", "by hand"),
         ("Temperature", "21.5 °C"),
