@@ -81,6 +81,7 @@ OWN_FORMATS: Final[dict[str, Any]] = {
     "first": ANGLE_Q,
     "standing": VAR_Q,
     "ratio.usual": VECTOR_Q,
+    "rubbing.var": VAR_Q,
     "felt": VECTOR_Q,
     "turned": VECTOR_Q,
     "jump": ANGLE_Q,

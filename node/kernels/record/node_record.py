@@ -17,8 +17,8 @@ from node.kernels.record.sensor_record import MAX_IMUS, MOUNT, OFFSET, STATIC, S
 # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches,
 # 6 no odd forces, 7 no swings, 8 no ramps, 9 no revisions, 10 no parts of cycles,
 # 11 no wrong aidings, 12 no counters that stand and no mirror, 13 no turns at rest and no errors that return,
-# 14 no ratio of encoder and gyroscope
-NODE_LAYOUT: Final = 15
+# 14 no ratio of encoder and gyroscope, 15 no string that rubs
+NODE_LAYOUT: Final = 16
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
@@ -141,6 +141,14 @@ RATIO: Final = np.dtype(
     ],
     align=True,
 )
+RUBBING: Final = np.dtype(
+    [
+        ("score", "i8"),  # uneven cycles of turning, twice, less even ones
+        ("left", "i8"),  # cycles of turning, until the string is no more known to rub
+        ("var", "f8"),  # rad^2, of the yaw by what it may have turned by, unseen
+    ],
+    align=True,
+)
 GUARD: Final = np.dtype(
     [
         ("readings", READINGS),  # the newest readings, to see repeats
@@ -179,6 +187,7 @@ GUARD: Final = np.dtype(
         ("creep", CREEP),  # of the string below a head at rest
         ("same", SAME),  # errors of the encoder that return
         ("ratio", RATIO),  # of the encoder's turns to the gyroscope's
+        ("rubbing", RUBBING),  # of the string against the rock
         ("jump", "f8"),  # rad, by which resets that nothing explains have moved the yaw
         ("last_jump", "f8"),  # rad, of it by the reset since the last aiding that agreed
         ("odd", "i8"),  # cycles in a row whose force at rest is not that of gravity as the filter has it

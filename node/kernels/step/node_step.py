@@ -77,6 +77,7 @@ from node.kernels.turns.guard import guard_reading, judge_cycle
 from node.kernels.turns.mismatches import doubt_step
 from node.kernels.turns.ramps import follow_ramp
 from node.kernels.turns.rest_watch import watch_rest
+from node.kernels.turns.rubbing import follow_rubbing
 from node.kernels.turns.swings import follow_swing
 from node.kernels.turns.yaw_doubts import noise_var, passing_var, put_delay_right, unexplained_var
 
@@ -204,6 +205,7 @@ def after_loop(node: Any, settings: Any, moment: Array, status: int, waits: int)
     follow_swing(node)
     follow_ramp(node)
     follow_creep(node, settings)
+    follow_rubbing(node)
     watch_axes(node, settings)
     put_delay_right(node)
     doubt_step(node, moment[END] - moment[START])

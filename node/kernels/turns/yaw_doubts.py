@@ -87,7 +87,7 @@ def noise_var(node: Any) -> float:
 def unexplained_var(node: Any) -> float:
     """Variance (rad^2) of the yaw that no filter averages away: of misfit, string, encoder, of a late window."""
     guard, dated = node.guard, passing_var(node) + delay_var(node)
-    of_string = guard.ramp.doubt + guard.creep.doubt + angular_square(guard.disputed)
+    of_string = guard.ramp.doubt + guard.creep.doubt + guard.rubbing.var + angular_square(guard.disputed)
     of_encoder = angular_square(guard.jump) + same_error_var(node) + ratio_var(node)
     return bounded_variance(misfit_var(node) + of_string + of_encoder + dated)
 
