@@ -6,7 +6,7 @@ Source: thesis chapter 1. Frame: north, east, down; m.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -130,7 +130,9 @@ def _draw(
     (over_depth, shades), (plan, zoom) = figure.subplots(2, 2, height_ratios=(1.15, 1.0))
     bad = np.max(np.where(np.isfinite(found.probability), found.probability, 0.0), axis=1) > allowed
     bad |= np.min(np.where(np.isfinite(found.thickness), found.thickness, np.inf), axis=1) < required
-    _thickness(over_depth, columns, found, required, thinness_ranking(found)[:shown], bad)
+    ranking = thinness_ranking(found)
+    drawable = np.isfinite(found.thickness[ranking]).any(axis=1)  # a joint that is missing all along has no line
+    _thickness(over_depth, columns, found, required, [*ranking[drawable], *ranking[~drawable]][:shown], bad)
     over_depth.set_ylabel(words.depth)
     _map(shades, columns, found, required, allowed, shade)
     shades.set_ylabel(words.depth)
@@ -145,7 +147,7 @@ def _thickness(
     columns: Columns,
     found: Joints,
     required: float,
-    which: npt.NDArray[np.intp],
+    which: Sequence[np.intp],
     bad: npt.NDArray[np.bool_],
 ) -> None:
     """Draw the thickness over depth; the band of the worst joint only, since bands on bands cannot be read."""
@@ -245,7 +247,7 @@ def pooled_cells(values: Array, worst_of: Callable[..., Any]) -> tuple[Array, Ar
 
 def _frame(axes: Axes, title: str) -> None:
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_title(title)
+    axes.set_title(title, size="medium")  # that of a joint with its names is long
 
 
 def _plan(axes: Axes, columns: Columns, found: Joints, bad: npt.NDArray[np.bool_], words: PlaneWords) -> None:

@@ -230,6 +230,44 @@ def test_a_warning_stands_on_the_report_of_a_hole(tmp_path: Path) -> None:
     assert any("20 m" in line for line in check.words)
 
 
+@pytest.mark.parametrize("language", [language for language in LANGUAGES if language != "en"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Line 23: Inc (deg) = '-999.25' stands for no value, at 63: the station is left out.",
+        "Line 23: MD = '' stands for no value: the station is left out.",
+        "The hole: the station at 30 m departs by 11.9 and 11.8 deg from its neighbours, which differ by 0.1: "
+        "inclination 12 deg, azimuth 109 deg.",
+        "K011: a dogleg of 9.0 deg from 3 to 6 m, 90 deg in 30 m; expected at most 2 deg and 1 deg a metre.",
+        "Column K1, line 6: inclination_deg stands for no value: the station at 5 m is left out.",
+        "Column K1: it leans by 30.0 deg from its design at 5 m; expected at most 10 deg.",
+        "Column K1: surveyed to 10000 m; it is designed to 10 m.",
+        "K1: a radius of 60 m; expected at most 3 m.",
+        "Joint K1-K2: radii of up to 60 m at a spacing of 0.7 m.",
+        "T-12 / not stated",
+    ],
+)
+def test_a_warning_and_what_is_not_stated_are_said_in_every_language(text: str, language: str) -> None:
+    """Each number and name once, and none of the English words."""
+    said = word_table(language).text(text)
+    assert sorted(re.findall(r"-?\d+\.?\d*", said)) == sorted(re.findall(r"-?\d+\.?\d*", text))
+    english = {
+        "the",
+        "station",
+        "left",
+        "out",
+        "stands",
+        "for",
+        "from",
+        "leans",
+        "expected",
+        "most",
+        "stated",
+        "spacing",
+    }
+    assert not english & set(re.findall(r"[a-z]+", said)) - ({"station"} if language == "fr" else set())
+
+
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_every_report_is_set_and_alike_twice(made: Any, language: str) -> None:
     hole = made(language)[-1]

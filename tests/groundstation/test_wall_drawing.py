@@ -195,3 +195,16 @@ def test_a_column_of_a_grid_is_nearer_to_its_name_than_any_other() -> None:
     for text in names:
         away = np.hypot(*(centres[:, -1, ::-1] - text.get_position()).T)
         assert f"G{int(np.argmin(away))}" == text.get_text()
+
+
+def test_joints_that_are_missing_all_along_leave_room_for_those_that_have_a_thickness(tmp_path: Path) -> None:
+    """Two of seven columns were not drilled: four joints are open everywhere, and three lines were none."""
+    (tmp_path / "h.csv").write_text("column,north_m,east_m\n" + "".join(f"K{k},0,{0.75 * k}\n" for k in range(7)))
+    rows = "".join(f"K{k},{md},{0.1 * k},90\n" for k in (0, 1, 3, 5, 6) for md in (0, 5, 10))
+    (tmp_path / "s.csv").write_text(f"column,md_m,inclination_deg,azimuth_deg\n{rows}")
+    text = 'radius_m = 0.6\nthickness_m = 0.8\nlength_m = 10\nheads = "h.csv"\nstations = "s.csv"\n'
+    (tmp_path / "wall.toml").write_text(text)
+    figure = draw_wall(judged := read_wall(tmp_path / "wall.toml"), judge_wall(judged))
+    plt.close(figure)
+    drawn = {line.get_label().split(",")[0]: np.isfinite(line.get_xdata()).any() for line in figure.axes[0].lines}
+    assert {name for name, is_drawn in drawn.items() if is_drawn} >= {"K0–K1", "K5–K6"}
