@@ -48,6 +48,7 @@ def test_who_says_no_name_is_not_joined(said: bytes, tmp_path: Path) -> None:
     joined: list[str] = []
     listener = StepListener(tmp_path / "s", lambda name, _: joined.append(name), lambda *_: None)
     with socket.socket(socket.AF_UNIX) as stranger:
+        stranger.settimeout(5.0)
         stranger.connect(str(tmp_path / "s"))
         stranger.sendall(said)
         stranger.shutdown(socket.SHUT_WR)
