@@ -22,6 +22,7 @@ from groundstation.service.alarms.verdict_words import VerdictDoubt, Word
 from groundstation.service.answers.adjustment_views import budget_of_toe
 from groundstation.service.answers.model import RigModel
 from groundstation.service.hole.examined_hole import UNSOLVED
+from groundstation.service.hole.hole_adjustment import number_values
 from groundstation.survey.adjustment import normal_equations
 from groundstation.survey.adjustment.linear_solution import WIDE
 from groundstation.survey.adjustment.looks import OF_TUBE
@@ -262,3 +263,10 @@ def test_what_a_covariance_is_made_of_adds_up_to_it_at_every_station(tmp_path: P
     assert (of_path > legs - undone[-1]).all()
     items = {row["item"]: row["toe_cm"] for row in shown_on(model, "setup")["items"]}
     assert items["path"] == pytest.approx(100.0 * math.sqrt(of_path.max()), rel=1e-3)
+
+
+@given(values=st.lists(st.integers(0, 40), max_size=60))
+def test_chains_are_numbered_as_they_come(values: list[int]) -> None:
+    different, places = number_values(np.array(values, np.uint32))
+    assert different == list(dict.fromkeys(values))
+    assert [different[place] for place in places.tolist()] == values

@@ -15,6 +15,7 @@ from groundstation.service.hole.station import SurveyStation
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
+DEPTH = attrgetter("md")
 
 
 class HoleStations:
@@ -29,7 +30,7 @@ class HoleStations:
     ----------
     all : from the collar down
     of_rows : station of each row of the table
-    touched : those to which a stop has come, by depth (m), until they are taken
+    touched : those to which a stop has come, by depth (m), since this was emptied
     """
 
     def __init__(self, stops: ResolvedStops, tolerance: float) -> None:
@@ -40,20 +41,24 @@ class HoleStations:
 
     def take_stop(self, other: ResolvedStops, row: int) -> bool:
         """Take a stop of another table; a revision of a known one takes its place, unless it is older: False."""
-        station = self._station_at(other.rows["md"].item(row))
-        revised = station.stops.revised_by(other, row)
+        md, found = other.rows["md"].item(row), None
+        first = bisect_left(self.all, md - 2.0 * self._tolerance, key=DEPTH)
+        for station in itertools.islice(self.all, first, None):
+            if abs(station.md - md) <= self._tolerance:
+                found = station
+            if found is not None or station.md > md:
+                break
+        if found is None:
+            found = SurveyStation(md, self._stops)
+            insort(self.all, found, key=DEPTH)
+        revised = found.stops.revised_by(other, row)
         if revised is None:
-            station.add_stop(other, row)
-            self.of_rows.append(station)
-        elif not station.revise_stop(revised, other, row):
+            found.add_stop(other, row)
+            self.of_rows.append(found)
+        elif not found.revise_stop(revised, other, row):
             return False
-        self.touched[station.md] = station
+        self.touched[found.md] = found
         return True
-
-    def take_touched(self) -> dict[float, SurveyStation]:
-        """Those to which a stop has come since the last time, by depth (m)."""
-        taken, self.touched = self.touched, {}
-        return taken
 
     @property
     def below(self) -> list[SurveyStation]:
@@ -68,14 +73,3 @@ class HoleStations:
             rows += one.stops.rows
         station_of_row[np.array(rows)] = np.arange(1, len(below) + 1).repeat([one.count for one in below])
         return station_of_row, np.array([one.md for one in below])
-
-    def _station_at(self, md: float) -> SurveyStation:
-        first = bisect_left(self.all, md - 2.0 * self._tolerance, key=attrgetter("md"))
-        for station in itertools.islice(self.all, first, None):
-            if abs(station.md - md) <= self._tolerance:
-                return station
-            if station.md > md:
-                break
-        station = SurveyStation(md, self._stops)
-        insort(self.all, station, key=attrgetter("md"))
-        return station

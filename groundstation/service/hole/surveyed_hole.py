@@ -303,7 +303,7 @@ class SurveyedHole:
 
     def _adjust(self) -> list[SurveyStation]:
         """Adjust the hole; all of its stations have changed, and so has the direction from which it is drawn."""
-        self._stations.take_touched()
+        self._stations.touched = {}
         below = self._stations.below
         for station in self._stations.all:
             station.forget_view()
@@ -317,7 +317,8 @@ class SurveyedHole:
 
     def _fuse(self, since: float) -> list[SurveyStation]:
         """Fuse the stations of which something may have changed since a time (s), together those with one more stop."""
-        by_depth = self._stations.take_touched() | self._movement.judge_since(since)
+        touched, self._stations.touched = self._stations.touched, {}
+        by_depth = touched | self._movement.judge_since(since)
         changed = [*map(by_depth.__getitem__, sorted(by_depth))]
         weighting = self._config.weighting
         if weighting is Weighting.BAYES and (grown := [station for station in changed if station.lacks_newest]):
