@@ -525,5 +525,5 @@ void node_advance(struct chip_node *node, int64_t now_us)
     if ((node->save_is_due && node->refused == 0u) || now_ms - node->saved_at_ms >= every) {
         memory_save(node, now_ms);
     }
-    mail_send(&node->kept.mail, &node->ends[NODE_UPPER].link, now_ms);
+    mail_send(&node->kept.mail, &node->ends[NODE_UPPER].link, now_ms); /* behind the save; a worn flash ends nothing */
 }

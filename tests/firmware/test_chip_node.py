@@ -122,6 +122,7 @@ def test_a_chip_at_rest_finds_its_yaw_and_tells_of_it(library: ctypes.CDLL, imag
     assert abs(wrapped(survey.yaw - 1.0 - OFFSET)) < 1e-3
     assert survey.imus[0].force[1] == pytest.approx(0.34, abs=2e-3)
     assert survey.imus[0].force[2] == pytest.approx(-9.8, abs=2e-3)
+    assert survey.systematic_var == pytest.approx(1e-6 + SETTINGS.mount_std**2, rel=0.15)  # in levels from above
     assert survey.imus[0].force_cov[0][0] == pytest.approx(9e-6 / survey.samples, rel=0.6)
     assert [rig.chip.number(k) for k in (WRONG_ABOVE, WRONG_BELOW, OVERFLOWS)] == [0, 0, 0]
     assert rig.chip.number(EXCHANGES) > 30
@@ -163,6 +164,7 @@ def test_what_is_for_others_goes_on_and_comes_back_unchanged(library: ctypes.CDL
     assert abs(wrapped(aiding.yaw - 1.0)) < 1e-6
     assert aiding.hops == 1
     assert aiding.offset == pytest.approx(OFFSET - 0.4, abs=1e-6)
+    assert aiding.systematic_var == pytest.approx(2e-6, rel=0.15)  # of both joints, in levels of 0.5 dB
     events = [Event(BELOW, k, 12.0 + k, EVENT_TABLE[1].severity, "bad_sample", {"k": k}, EPOCH) for k in range(1, 13)]
     for event in events:
         rig.tube.endpoint.mail.submit(event, now)
@@ -220,6 +222,19 @@ def test_a_cut_while_it_saves_loses_nothing_and_gives_no_number_twice(
     assert states[-1].flags == NodeFlag.RESTORED
 
 
+def test_a_worn_flash_is_told_and_ends_nothing(library: ctypes.CDLL, image: bytes) -> None:
+    rig = Rig(library, image)
+    rig.world.run(4.0)
+    library.shim_wear(1)
+    rig.world.motion = lambda at: 0.5
+    rig.world.run(8.0)
+    library.shim_wear(0)
+    assert "started" in [event.code for event in rig.heard(Event)]
+    assert rig.heard(NodeState)[-1].flags & NodeFlag.NOT_SAVED
+    rig.world.run(40.0)
+    assert not rig.heard(NodeState)[-1].flags & NodeFlag.NOT_SAVED  # it is tried again
+
+
 def test_a_receipt_of_other_content_forgets_nothing(library: ctypes.CDLL, image: bytes) -> None:
     rig = Rig(library, image)
     rig._receipted = _Everything()
@@ -263,6 +278,8 @@ def test_a_start_from_a_save_is_that_of_python(library: ctypes.CDLL, cycles: int
         node.aiding(nodes, settings, rough.aiding(k))
     ours = bytearray(node._integers["node"].tobytes())
     kept = np.frombuffer(ours, FIXED_NODE)
+    for record in (kept[0], nodes[0]):
+        record["twist"]["wound"], record["mount"]["aligning"], record["joints"]["solved"] = 0, 1, 1
     configs = default_config()
     nodes = unpack_state_slot(pack_state_slot(nodes, b"", 1)).nodes
     resume_node(nodes, configs)
