@@ -47,8 +47,10 @@ from telemetry.messages import (
     Reply,
     Side,
     SurveyMeasurement,
+    TimeReply,
 )
 from telemetry.presentation.content import content_of_message
+from telemetry.presentation.msgpack_codec import encode_message
 
 CHIP, BELOW = 2, 1
 EPOCH = 3
@@ -178,6 +180,26 @@ def test_what_is_for_others_goes_on_and_comes_back_unchanged(library: ctypes.CDL
     assert ordered == {40, 41, 42}
 
 
+def test_what_is_for_one_hop_is_not_passed_on_as_a_payload(library: ctypes.CDLL, image: bytes) -> None:
+    """An aiding whose epoch no signal can say comes by ISO-TP: below the chip it would be the yaw of another joint."""
+    rig = Rig(library, image, below=True)
+    assert rig.tube is not None
+    rig.world.run(3.0)
+    rig.tube.heard.clear()
+    rig.world.after_cycle = lambda now: None
+    for k in range(10):
+        aiding = Aiding(2.0, 1e-8, 0.0, 0.0, 0.0, rig.world.now, 100 + k, 0, epoch=1 << 20)
+        rig.base.endpoint.send_aiding(aiding, rig.world.now)
+        link = rig.base.endpoint._links[Side.LOWER]
+        link.send_reliable(encode_message(aiding))
+        link.send_reliable(encode_message(TimeReply(1.0, 2.0, 3.0, 4.0, 1.0, 1e-6, 1 << 20)))
+        up = rig.tube.endpoint._links[Side.UPPER]
+        up.send_reliable(encode_message(aiding))
+        rig.world.run(1.0)
+    assert not [m for m in (*rig.tube.heard, *rig.base.heard) if isinstance(m, Aiding)]
+    assert abs(rig.tube.endpoint.clock.rig_from_local(rig.world.now) - rig.world.now) < 12e-3
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_frames_that_are_lost_lose_no_message(library: ctypes.CDLL, image: bytes, seed: int) -> None:
     rig, random = Rig(library, image, below=True), np.random.default_rng(seed)
@@ -241,7 +263,7 @@ def test_a_receipt_of_other_content_forgets_nothing(library: ctypes.CDLL, image:
     rig.world.run(8.0)
     (first, *_) = [event for event in rig.heard(Event) if event.sequence == 1]
     wrong = Receipt(CHIP, 1, bytes(reversed(content_of_message(first))))
-    rig.base.endpoint.mail._send_down(_encoded(wrong), CHIP, 3)  # type: ignore[arg-type]
+    rig.base.endpoint.mail._send_down(encode_message(wrong), CHIP, 3)  # type: ignore[arg-type]
     count = sum(event.sequence == 1 for event in rig.heard(Event))
     rig.world.run(15.0)
     assert sum(event.sequence == 1 for event in rig.heard(Event)) > count  # it is sent again
@@ -257,12 +279,6 @@ class _Everything(set[int]):
 
     def __contains__(self, _: object) -> bool:
         return True
-
-
-def _encoded(receipt: Receipt) -> bytes:
-    from telemetry.presentation.msgpack_codec import encode_message
-
-    return encode_message(receipt)
 
 
 WORK_SPACE = ("filter.gain", "filter.ph", "filter.rest", "filter.decay", "filter.overflows", "guard.found", ".m")
