@@ -29,7 +29,24 @@ from telemetry.presentation.can_c_codec import NATIVE_CODE, NATIVE_HEADER, write
 
 FIRMWARE: Final = DOCS.parent / "firmware"
 FOUND: Final = re.compile(r"^(.+):(\d+):misra-c2012-(\d+\.\d+)$", re.MULTILINE)
-REQUIRED: Final = "2.2 7.2 8.4 9.3 10.1 10.3 10.4 10.6 10.7 10.8 11.9 14.2 15.7 17.7 20.7 21.14".split()  # of those found
+REQUIRED: Final = [
+    "2.2",
+    "7.2",
+    "8.4",
+    "9.3",
+    "10.1",
+    "10.3",
+    "10.4",
+    "10.6",
+    "10.7",
+    "10.8",
+    "11.9",
+    "14.2",
+    "15.7",
+    "17.7",
+    "20.7",
+    "21.14",
+]  # of those found
 ABOUT: Final = {
     "2.2": "what has no effect",
     "2.3": "types that nothing uses: the checks of a record's layout are some",

@@ -42,7 +42,6 @@ struct mail_item *mail_place(struct chip_mail *mail, const struct hop_link *link
     place->is_settled = false;
     place->number = mail->next_number;
     place->is_needed = is_needed;
-    place->is_saved = false;
     place->length = 0u;
     mail->next_number++;
     return place;
@@ -55,25 +54,6 @@ void mail_keep(struct mail_item *item, uint32_t length, uint32_t now_ms)
     item->wait_ms = FIRST_WAIT_MS;
 }
 
-bool mail_needs_save(const struct chip_mail *mail)
-{
-    uint32_t k;
-    for (k = 0u; k < MAIL_ITEMS; k++) {
-        if (mail->items[k].length > 0u && !mail->items[k].is_saved && !mail->items[k].is_settled) {
-            return true;
-        }
-    }
-    return false;
-}
-
-void mail_saved(struct chip_mail *mail)
-{
-    uint32_t k;
-    for (k = 0u; k < MAIL_ITEMS; k++) {
-        mail->items[k].is_saved = true;
-    }
-}
-
 void mail_resume(struct chip_mail *mail, uint32_t now_ms)
 {
     uint32_t k;
@@ -83,7 +63,6 @@ void mail_resume(struct chip_mail *mail, uint32_t now_ms)
         }
         mail->items[k].send_at_ms = now_ms;
         mail->items[k].wait_ms = FIRST_WAIT_MS;
-        mail->items[k].is_saved = true;
     }
 }
 
@@ -92,7 +71,7 @@ void mail_send(struct chip_mail *mail, struct hop_link *link, uint32_t now_ms)
     uint32_t k;
     for (k = 0u; k < MAIL_ITEMS; k++) {
         struct mail_item *const one = &mail->items[k];
-        if (one->length == 0u || !one->is_saved || link_holds(link, one->payload)) {
+        if (one->length == 0u || link_holds(link, one->payload)) {
             continue;
         }
         if (one->is_settled) {

@@ -1,6 +1,6 @@
 /* What must reach the ground station: kept until its receipt, over a power cut too, and sent again until then.
  *
- * A payload leaves only after it was saved, so a number that was sent is never given to another message.
+ * Its node saves before it lets it send, so a number that was sent is never given to another message.
  */
 #ifndef BORECHAIN_CHIP_MAIL_H
 #define BORECHAIN_CHIP_MAIL_H
@@ -20,7 +20,6 @@ struct mail_item {
     uint32_t wait_ms;
     uint16_t length;        /* 0: free */
     bool is_needed;         /* never dropped for another */
-    bool is_saved;
     bool is_settled;        /* receipted; it is free once the link has let go of it */
     uint8_t payload[MAIL_ROOM];
 };
@@ -37,11 +36,9 @@ struct chip_mail {
 struct mail_item *mail_place(struct chip_mail *mail, const struct hop_link *link, bool is_needed);
 /* The payload of an item is whole: it is due. Of length 0 the item is given back. */
 void mail_keep(struct mail_item *item, uint32_t length, uint32_t now_ms);
-bool mail_needs_save(const struct chip_mail *mail);
-void mail_saved(struct chip_mail *mail);
 /* After a start all is due. */
 void mail_resume(struct chip_mail *mail, uint32_t now_ms);
-/* Hands what is due and saved to the link. */
+/* Hands what is due to the link. */
 void mail_send(struct chip_mail *mail, struct hop_link *link, uint32_t now_ms);
 /* False for a receipt of other content, or of nothing that is kept. */
 bool mail_receipt(struct chip_mail *mail, int64_t number, const uint8_t *content, uint32_t length);

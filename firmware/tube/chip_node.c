@@ -29,6 +29,9 @@
 #define STATIC_BIAS 1
 #define WHOLE_QUALITY 100u
 #define MOST_HOPS 250
+#define STATE 5 /* kinds of payloads: those below are for one hop */
+#define BLOCK_SEGMENT 11
+#define SESSION_OFFER 15
 
 static uint32_t ms_of(int64_t us)
 {
@@ -312,6 +315,12 @@ static void on_command(struct chip_node *node, const struct word_order *order)
     (void)link_send(&node->ends[NODE_UPPER].link, answer->room, answer->length);
 }
 
+/* Receipts, orders, parts of a block, offers of a session. */
+static bool goes_down(int64_t kind)
+{
+    return kind == WORDS_RECEIPT || kind == WORDS_COMMAND || kind == BLOCK_SEGMENT || kind == SESSION_OFFER;
+}
+
 static void on_upper_payload(void *own, const uint8_t *payload, uint32_t length)
 {
     struct chip_node *const node = own;
@@ -319,6 +328,9 @@ static void on_upper_payload(void *own, const uint8_t *payload, uint32_t length)
     int64_t kind = 0, target = 0;
     if (!word_open(payload, length, &kind, &target)) {
         return;
+    }
+    if (!goes_down(kind)) {
+        return; /* it is for one hop, and none that comes as a payload is read: never a yaw of another joint */
     }
     if (target != node->identity.tube) {
         (void)pass_on(node, NODE_LOWER, payload, length);
@@ -339,7 +351,7 @@ static void on_lower_payload(void *own, const uint8_t *payload, uint32_t length)
 {
     struct chip_node *const node = own;
     int64_t kind = 0, target = 0;
-    if (word_open(payload, length, &kind, &target) && target == BASE) {
+    if (word_open(payload, length, &kind, &target) && target == BASE && kind >= STATE && !goes_down(kind)) {
         (void)pass_on(node, NODE_UPPER, payload, length);
     }
 }
@@ -525,5 +537,5 @@ void node_advance(struct chip_node *node, int64_t now_us)
     if ((node->save_is_due && node->refused == 0u) || now_ms - node->saved_at_ms >= every) {
         memory_save(node, now_ms);
     }
-    mail_send(&node->kept.mail, &node->ends[NODE_UPPER].link, now_ms);
+    mail_send(&node->kept.mail, &node->ends[NODE_UPPER].link, now_ms); /* behind the save; a worn flash ends nothing */
 }

@@ -106,5 +106,4 @@ void memory_save(struct chip_node *node, uint32_t now_ms)
         return;
     }
     node->refused = 0u;
-    mail_saved(&node->kept.mail);
 }

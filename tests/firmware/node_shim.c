@@ -12,6 +12,7 @@ static struct chip_node node;
 static uint8_t flash[2][SLOT_SIZE];
 static jmp_buf cut;
 static long words_left = -1;
+static bool is_worn;
 
 static void spend(void)
 {
@@ -27,7 +28,7 @@ static bool erase(void *own, uint32_t slot)
     (void)own;
     spend();
     memset(flash[slot], 0xFF, SLOT_SIZE);
-    return true;
+    return !is_worn;
 }
 
 static bool write_word(void *own, uint32_t slot, uint32_t at, const uint8_t word[SLOT_WORD])
@@ -49,6 +50,11 @@ static const struct slot_board board = {NULL, SLOT_SIZE, erase, write_word, read
 void shim_clear(void)
 {
     memset(flash, 0xFF, sizeof flash);
+}
+
+void shim_wear(int worn)
+{
+    is_worn = worn != 0;
 }
 
 void shim_power(long words)

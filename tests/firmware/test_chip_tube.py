@@ -27,7 +27,7 @@ from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import PERIOD
 from node.process.counter import BootCounter
 from sim.can.can_hub import CanHub, running_hub
-from sim.world.recording import record_sensors, yaw_error
+from sim.world.recording import fastest_at, record_sensors, yaw_error
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 from telemetry.application.endpoint import Endpoint
@@ -268,5 +268,6 @@ def judge_all(surface: Surface, string: String) -> None:
     assert sorted(by_number) == list(range(1, max(by_number) + 1))
     for state in surface.kept:
         if isinstance(state, NodeState) and state.tube in (CHIP, BELOW) and not state.flags & UNFIT:
-            doubt = math.sqrt(state.yaw_var + state.systematic_var)
+            rate = fastest_at(string.world, state.at)  # by which a wrong clock errs, as in the real-time run
+            doubt = math.sqrt(state.yaw_var + state.systematic_var + rate * rate * state.clock_var)
             assert abs(yaw_error(string.world, state.tube, state.yaw, state.at)) < 5.0 * doubt + 0.002, state
