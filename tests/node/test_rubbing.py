@@ -93,8 +93,11 @@ def test_a_string_that_turns_evenly_does_not_rub_however_it_starts(
 
 
 @pytest.mark.parametrize("split", [False, True])
-def test_nor_do_many_starts_and_stops(split: bool) -> None:
-    driven, ramp = Driven(4), np.interp(np.arange(120) * PERIOD, [0.0, 2.0, 60.0, 62.0], [0.0, SPEED, SPEED, 0.0])
+@pytest.mark.parametrize("ramp_s", [2.0, 4.0])
+def test_nor_do_many_starts_and_stops(split: bool, ramp_s: float) -> None:
+    """A stop is as uneven as a start, and the rest between the two parts them."""
+    over = [0.0, ramp_s, 62.0 - ramp_s, 62.0]
+    driven, ramp = Driven(4), np.interp(np.arange(120) * PERIOD, over, [0.0, SPEED, SPEED, 0.0])
     inside = np.diff(np.concatenate([[0.0], ramp]))[:, None] * (np.arange(PARTS) / PARTS - 0.4375)
     for _ in range(10):
         for own in (ramp[:, None] + inside + WHITE * driven.random.standard_normal((120, PARTS))).tolist():
