@@ -189,14 +189,16 @@ def survey(
     from groundstation.survey.tools.instruments import load_tool
     from groundstation.survey.well.analysis import analyse_survey, default_method
     from groundstation.survey.well.methods import Method
+    from groundstation.survey.well.reference_frames import ReferenceFrame
 
     tool = load_tool(instrument)
     place = site or known_site(SiteFigures(), FrameRequest(), magnetic_needs([tool])).figures.to_site()
-    record = read_any(Path(file), DisplacementRule(displacement_rule), TableWish(hole=hole)).record
+    understood = read_any(Path(file), DisplacementRule(displacement_rule), TableWish(hole=hole))
+    record, north = understood.record, understood.north or "site"
     for warning in survey_warnings(record):
         warnings.warn(f"{file}: {warning.text}", stacklevel=2)
     path = default_method(record) if method is None else Method(method)
-    return analyse_survey(record, path, tool, place, section_azimuth)
+    return analyse_survey(record, path, tool, place, section_azimuth, ReferenceFrame(north, north))
 
 
 def answer_survey(request: SurveyRequest) -> SurveyAnswer:

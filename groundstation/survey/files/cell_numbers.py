@@ -16,8 +16,10 @@ THREE_PLACES = re.compile(r"[+-]?\d{1,3},\d{3}")
 OWN_UNIT = re.compile(r"\S+\s*(m|ft|deg|rad|°|'|feet|gon)")
 
 
-def decimal_sign(path: Path, cells: Sequence[str], separator: str, asked: str | None) -> str:
+def decimal_sign(path: Path, cells: Sequence[str], separator: str, asked: str | None, option: str = "--decimal") -> str:
     """What stands for the decimal point in a table: ``.``, ``,``, or ``.`` with commas of thousands as ``,.``.
+
+    ``option`` is the name of what may say it, if there is one.
 
     Raises
     ------
@@ -38,11 +40,12 @@ def decimal_sign(path: Path, cells: Sequence[str], separator: str, asked: str | 
         beside = f" beside {points[0]!r}" if points else ""
         raise SurveyError(
             f"{path}: {commas[0]!r} may be a decimal comma or thousands{beside}; "
-            "expected one sign for decimals and none for thousands, or --decimal comma or point"
+            f"expected one sign for decimals and none for thousands{option and f', or {option} comma or point'}"
         )
     if separator == "," or all(THREE_PLACES.fullmatch(cell) for cell in commas):
         raise SurveyError(
-            f"{path}: {commas[0]!r} may be thousands or a decimal comma; expected decimal points, or --decimal"
+            f"{path}: {commas[0]!r} may be thousands or a decimal comma; "
+            f"expected decimal points{option and f', or {option}'}"
         )
     return ","
 

@@ -174,7 +174,7 @@ def _decimal(path: Path, table: FieldTable, header: list[str], texts: tuple[str,
         return "."
     places = [k for k, name in enumerate(header) if name not in texts and name]
     cells = [row[k] for row in table.rows for k in places if row[k] and row[k].lstrip("+-")[:1].isdigit()]
-    return decimal_sign(path, cells, table.separator, None)
+    return decimal_sign(path, cells, table.separator, None, option="")
 
 
 def _is_number(cell: str, decimal: str) -> bool:

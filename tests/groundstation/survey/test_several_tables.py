@@ -170,6 +170,12 @@ def test_a_sheet_with_a_cell_in_its_last_corner_is_read_in_little_memory(tmp_pat
     assert list(read_any(put(tmp_path, "s.xlsx", content.getvalue())).record.md) == [0.0, 10.0, 20.0]
 
 
+def test_the_north_that_a_file_says_is_that_of_a_notebooks_answer(tmp_path: Path) -> None:
+    for header, north in (("MD,Inc,AZIM_GN", "grid"), ("MD,Inc,AZIM_TN", "true"), ("MD,Inc,AZIM", "site")):
+        found = api.survey(put(tmp_path, "s.csv", f"{header}\n0,0,0\n10,1,2\n"))
+        assert (found.frame.record, found.frame.answer) == (north, north)
+
+
 # tables of walls, which read what a survey reads
 
 WALL = (
@@ -206,6 +212,8 @@ def test_tables_of_walls_have_units_in_a_row_dips_and_norths(
     ("header", "row", "heads", "named"),
     [
         ("column,MD,Inc,AZIM_TN", "{},{},0.1,40", HEADS, "s.csv: AZIM_TN counts from true north, the wall says site"),
+        ("column;MD;Inc;Azi", "{};{};0,125;40,000", HEADS,
+         "s.csv: '0,125' may be thousands or a decimal comma; expected decimal points"),
         ("column,MD,Inc [mil],Azi", "{},{},0.1,40", HEADS, "s.csv: Inc [mil]: unknown unit 'mil'"),
         ("column,MD,Inc,Azi", "{},{},0.1,40", HEADS.replace("east_m\n", "east_m,length\n").replace("0\n", "0,12\n"),
          "h.csv"),
