@@ -79,7 +79,7 @@ def test_options_may_stand_in_a_file(tmp_path: Path) -> None:
     path.write_text("tube = 3\ncolour = 1\n")
     refused = run("node", "--config", str(path))
     assert refused.returncode == 2
-    assert "colour: unknown key; expected one of above, below, clock, drive-joint-deg" in " ".join(
+    assert "colour: unknown key; expected one of above, below, clock, compiled-by, drive-joint-deg" in " ".join(
         refused.stderr.split()
     )
     path.write_text("tube = ")

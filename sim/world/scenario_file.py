@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
-from node.firmware.kernel_choice import CHIP, LOOPS
+from node.firmware.kernel_choice import CHIP, LIBRARY, LOOPS
 from node.kernels.record.sensor_record import MAX_IMUS
 from sim.world.path_section import PathSection
 from sim.world.radio_section import RadioSection
@@ -213,7 +213,7 @@ def known_kernel(name: str) -> str:
     PydanticCustomError
         When there is none of that name.
     """
-    known = [other for other in LOOPS if other != CHIP]
+    known = [other for other in LOOPS if other not in {CHIP, LIBRARY}]
     if name not in known:
         raise PydanticCustomError("kernel", "expected one of {known}", {"known": ", ".join(known)})
     return name

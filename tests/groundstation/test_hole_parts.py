@@ -168,7 +168,9 @@ def test_a_long_hole_is_screened_in_its_sixteen_latest_stops() -> None:
     left = np.random.default_rng(1).standard_normal((80, 3))
     weights = np.repeat(np.diag([1.0, 2.0, 5.0])[None], 80, axis=0)
     found: Any = SimpleNamespace(
-        looks=SimpleNamespace(stop=stop, tube=np.tile([1, 0], 40)), linear=SimpleNamespace(weights=weights), left=left
+        looks=SimpleNamespace(stop=stop, tube=np.tile([1, 0], 40)),
+        linear=SimpleNamespace(weights=weights),
+        left_of=left.__getitem__,
     )
     (each, told), (since, _) = late_tests(found)
     assert told.tolist() == [3] * 32

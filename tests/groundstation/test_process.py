@@ -393,7 +393,7 @@ async def test_a_change_is_published_on_the_key_it_changes(rig: tuple[Rig, Zenoh
     [
         (
             "dance?tube=1",
-            "take_survey|static_record|parameters|resend|align|alignment|timing|upload_parameters|accept_depth",
+            "take_survey|static_record|parameters|check_board|resend|align|alignment|timing|upload_parameters|accept_depth",
         ),
         ("take_survey", "tube=N"),
         ("take_survey?tube=251", "1..250"),

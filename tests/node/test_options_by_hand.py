@@ -181,7 +181,7 @@ def test_a_loop_is_there_only_meanwhile_and_under_a_name_of_its_own() -> None:
     with added_loop("own", make):
         assert kernel_of("own", memory) == float64_loop()
         with pytest.raises(
-            NodeConfigurationError, match="expected another name than float64, fixed, chip, own, got own"
+            NodeConfigurationError, match="expected another name than float64, fixed, chip, library, own, got own"
         ):
             added_loop("own", make).__enter__()
     assert made[0] is memory

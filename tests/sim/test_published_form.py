@@ -291,7 +291,9 @@ def test_it_is_chosen_by_the_settings_while_a_study_offers_it() -> None:
         assert kernel_of(KERNEL) == (published.run_cycle, published.offer_aiding, published_step, published_aiding)
         assert TubeSettings(1, kernel=KERNEL).kernel == KERNEL
     assert ours == LOOPS
-    with pytest.raises(NodeConfigurationError, match="kernel: expected one of float64, fixed, chip, got published"):
+    with pytest.raises(
+        NodeConfigurationError, match="kernel: expected one of float64, fixed, chip, library, got published"
+    ):
         TubeSettings(1, kernel=KERNEL)
 
 

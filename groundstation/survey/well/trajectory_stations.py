@@ -26,6 +26,7 @@ PLACES, VALUES = map(attrgetter, ("places", "values"))
 DEPTH_PLACES, DEPTH_VALUES = map(attrgetter, ("columns.places", "columns.values"))
 NONE: Final = Packed(np.zeros((2, 0)))
 NOTHING: Final = np.zeros(0)
+OF_DIRECTION = ("own", "width", "count", "depths", "depth_var")  # fields that each station has by itself
 NO_PLACES: Final = np.zeros(0, np.intp)
 
 
@@ -91,9 +92,7 @@ class TrajectoryStations:
         rows = self.rows
         at = slice(places.start, places.stop) if isinstance(places, range) else np.array(places)
         rows["tangent"][at] = tangents
-        owns, widths, counts, of_depths, own_vars = (
-            rows[name] for name in ("own", "width", "count", "depths", "depth_var")
-        )
+        owns, widths, counts, of_depths, own_vars = map(rows.__getitem__, OF_DIRECTION)
         for place, direction, tangent in zip(places, directions, tangents, strict=True):
             owns[place], columns, self._down[place] = tangent_errors(direction, tangent)
             self._columns[place], by_depth = columns, self.depths[place].columns
@@ -154,7 +153,9 @@ class TrajectoryStations:
                     own_marks[number].copy(), marks[number, :, : int(widths[k])].copy(), float(md[k + 1] - md[k])
                 )
                 for number, k in enumerate(marked)
-            ],
+            ]
+            if marked
+            else [],
             runs_of(shared, widths) if with_columns else [],
             covs,
         )

@@ -313,5 +313,5 @@ def test_float64_is_the_default_and_untouched() -> None:
 
 
 def test_an_unknown_kernel_is_refused() -> None:
-    with pytest.raises(NodeConfigurationError, match="kernel: expected one of float64, fixed, chip, got Q16"):
+    with pytest.raises(NodeConfigurationError, match="kernel: expected one of float64, fixed, chip, library, got Q16"):
         replace(TubeSettings(1), kernel="Q16")
