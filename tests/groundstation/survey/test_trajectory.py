@@ -10,9 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
+from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Direction
+from groundstation.survey.fusion.tangents import tangent_jacobian
 from groundstation.survey.tools.instruments import PropagationMode, Term, load_tool
 from groundstation.survey.well.analysis import analyse_survey
+from groundstation.survey.well.depth_errors import StationDepth
 from groundstation.survey.well.error_sources import Site
 from groundstation.survey.well.kernels.position_errors import add_stations, warm_up
 from groundstation.survey.well.methods import Method
@@ -32,6 +35,33 @@ def turned(inclination: float, azimuth: float, std: float, yaw_stds: list[float]
     lean = lean_of(inclination, azimuth, std)
     shared = np.outer([-lean.lean[1], lean.lean[0]], yaw_stds)
     return Direction(lean.lean, lean.down, lean.cov, shared)
+
+
+@pytest.mark.parametrize("inclination_deg", [20.0, 120.0])
+def test_the_vertical_of_a_direction_follows_its_lean_on_both_sides_of_level(inclination_deg: float) -> None:
+    direction, small = lean_of(inclination_deg * DEG, 0.7), 1e-6
+    side = math.copysign(1.0, direction.down)
+
+    def vertical(*step: float) -> float:
+        return side * math.sqrt(1.0 - float(np.sum((direction.lean + step) ** 2)))
+
+    slopes = [
+        (vertical(small, 0.0) - vertical(-small, 0.0)) / (2.0 * small),
+        (vertical(0.0, small) - vertical(0.0, -small)) / (2.0 * small),
+    ]
+    jacobian = tangent_jacobian(np.array([*direction.lean, direction.down]))
+    np.testing.assert_allclose(jacobian, [[1.0, 0.0], [0.0, 1.0], slopes], rtol=1e-8)
+
+
+def test_an_error_of_a_depth_goes_on_by_the_kink_there_below_stations_whose_depths_are_exact() -> None:
+    trajectory, error = Trajectory(), 0.01
+    trajectory.append(2.0, lean_of(0.0, 0.0, 0.0))
+    trajectory.append(4.0, lean_of(30.0 * DEG, 0.3, 0.0), StationDepth(Packed(np.array([[error]])), 0.0))
+    for md in (6.0, 8.0):
+        trajectory.append(md, lean_of(10.0 * md * DEG, 0.3, 0.0))
+    along = np.diff(trajectory.positions, axis=0) / 2.0
+    moved = [error * along[1], error * (along[1] - along[2]), error * (along[1] - along[2])]
+    np.testing.assert_allclose(trajectory.covs[2:], [np.outer(one, one) for one in moved], rtol=1e-9, atol=1e-18)
 
 
 def test_balanced_tangential_gives_the_printed_steps_of_table_4_29() -> None:
