@@ -10,6 +10,7 @@ from groundstation.survey.adjustment.kernels.observations import (
     add_looks,
     add_right_sides,
     linearise_looks,
+    mirror_upper,
     weigh_down,
 )
 from groundstation.survey.adjustment.kernels.path_elimination import (
@@ -46,6 +47,7 @@ def warm_adjustment() -> None:
     add_right_sides(
         first, first, first, jacobians, weights, residuals, extra, 6, np.zeros((1, 4)), np.zeros(width),
     )  # fmt: skip
+    mirror_upper(common, width)
     diagonal, tied, coupled = np.eye(4)[None].copy(), np.zeros((1, 4, 4)), np.zeros((1, 4, width + 1))
     eliminate_path(diagonal, tied, coupled)
     eliminate_few(np.eye(4)[None].copy(), tied, coupled.copy(), first, 6)
