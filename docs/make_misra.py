@@ -17,15 +17,11 @@ from pathlib import Path
 from typing import Final
 
 DOCS: Final = Path(__file__).parent
-sys.path[:0] = [str(DOCS.parent), str(DOCS)]
+sys.path[:0] = [str(DOCS.parent), str(DOCS), str(DOCS.parent / "tests" / "tools")]
 
+from chip_sources import write_chip_sources  # noqa: E402
 from make_board import write_between  # noqa: E402
 from make_tables import table  # noqa: E402
-
-from node.firmware.event_words import EVENTS_HEADER, write_event_table  # noqa: E402
-from node.firmware.node_image import LOADER, LOADER_TEXT  # noqa: E402
-from node.translation.firmware_build import FirmwareRequest, build_firmware  # noqa: E402
-from telemetry.presentation.can_c_codec import NATIVE_CODE, NATIVE_HEADER, write_native_codec  # noqa: E402
 
 FIRMWARE: Final = DOCS.parent / "firmware"
 FOUND: Final = re.compile(r"^(.+):(\d+):misra-c2012-(\d+\.\d+)$", re.MULTILINE)
@@ -81,19 +77,6 @@ ABOUT: Final = {
 }
 
 
-def write_generated(folder: Path) -> None:
-    """All that is written for a chip of one IMU."""
-    build_firmware(FirmwareRequest("c", 1, folder))
-    codec = write_native_codec()
-    for name, text in (
-        (NATIVE_HEADER, codec.header),
-        (NATIVE_CODE, codec.code),
-        (EVENTS_HEADER, write_event_table()),
-        (LOADER, LOADER_TEXT),
-    ):
-        (folder / name).write_text(text, encoding="utf-8")
-
-
 def findings_of(folder: Path) -> tuple[Counter[str], Counter[str]]:
     """Findings by rule, in the sources by hand and in those written into ``folder``."""
     includes = [f"-I{place}" for place in (FIRMWARE, FIRMWARE / "tube", folder)]
@@ -125,7 +108,7 @@ def main() -> None:
     if shutil.which("cppcheck") is None:
         sys.exit("expected cppcheck on the path, found none; install Debian's cppcheck")
     with tempfile.TemporaryDirectory() as folder:
-        write_generated(Path(folder))
+        write_chip_sources(Path(folder))
         found = findings_of(Path(folder))
     page = DOCS / "board.md"
     rows = table(("rule", "kind", "about", "by hand", "written"), rows_of(*found))

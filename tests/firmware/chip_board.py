@@ -11,14 +11,14 @@ import time
 import tty
 from pathlib import Path
 
-from node.firmware.event_words import EVENTS_HEADER, write_event_table
-from node.firmware.node_image import IMAGE, LOADER, LOADER_TEXT, provision_node
+from chip_sources import write_chip_sources
+
+from node.firmware.node_image import IMAGE, provision_node
 from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.integer_node import READING_SCALES
 from node.process.drivers.timed import TimedImu
-from node.translation.firmware_build import FirmwareRequest, build_firmware
 from node.translation.toolchains import OPTIONS, TOOLCHAINS
 from sim.can.can_hub import CanHub
 from telemetry.errors import MediumError
@@ -27,7 +27,7 @@ from telemetry.media.can_medium import CanSettings
 from telemetry.media.can_port import open_controller
 from telemetry.media.chip_bridge import ChipBridge
 from telemetry.media.serial_line import SerialLine
-from telemetry.presentation.can_c_codec import NATIVE_CODE, NATIVE_HEADER, write_native_codec
+from telemetry.presentation.can_c_codec import NATIVE_CODE
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 TUBE_SOURCES = FIRMWARE / "tube"
@@ -40,15 +40,7 @@ LINKED = ("-Wl,--gc-sections", "-DCHIP_END_ROOM=480u", "-nostartfiles", "--specs
 
 def build_tube(folder: Path) -> Path:
     """The program of a tube for QEMU's mps2-an386, from the sources of the product, linked for 192 kB and 32 kB."""
-    build_firmware(FirmwareRequest("c", 1, folder))
-    codec = write_native_codec()
-    for name, text in (
-        (NATIVE_HEADER, codec.header),
-        (NATIVE_CODE, codec.code),
-        (EVENTS_HEADER, write_event_table()),
-        (LOADER, LOADER_TEXT),
-    ):
-        (folder / name).write_text(text)
+    write_chip_sources(folder)
     places = (FIRMWARE, TUBE_SOURCES, TUBE_SOURCES / "mps2")
     sources = [str(source) for place in places for source in sorted(place.glob("*.c"))]
     own = ("borechain_step.c", "borechain_orders.c", NATIVE_CODE, str(FIRMWARE / "mps2" / "start.c"))

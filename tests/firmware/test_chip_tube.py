@@ -6,53 +6,40 @@ is one of rests and a turn, in the time of this machine.
 
 from __future__ import annotations
 
-import contextlib
 import math
 import os
-import queue
 import signal
-import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from chip_board import PATIENCE, EmulatedTube, TubeFlash, build_tube, sizes_of
 from forked_commands import Command as Forked
 from needed_programs import needs
+from own_clock_surface import Surface, living
 from rigs import free_endpoint, started
 
 from node.firmware.tube_settings import TubeSettings
-from node.kernels.arithmetic.formats import PERIOD
 from node.process.counter import BootCounter
 from sim.can.can_hub import CanHub, running_hub
 from sim.world.recording import fastest_at, record_sensors, yaw_error
 from sim.world.scenario import scenario_of
 from sim.world.world import World
-from telemetry.application.endpoint import Endpoint
 from telemetry.media.can_loopback import register_loopback
-from telemetry.media.neighbours import neighbour_ports
-from telemetry.media.zenoh_bus import ZenohBus, open_router
-from telemetry.media.zenoh_port import ZenohMedium
+from telemetry.media.zenoh_bus import open_router
 from telemetry.messages import (
-    BASE,
-    ENCODER,
     Command,
     Event,
     NodeFlag,
     NodeState,
     Reply,
-    Side,
     StaticRecord,
     SurveyMeasurement,
 )
-from telemetry.runtime import event_loop
-from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
-from telemetry.runtime.process_interface import Process
-from telemetry.runtime.timing import CycleTiming
 
 RIG, CHIP, ABOVE, BELOW = "chip-between", 2, 3, 1
+RECEIPTS = (Event, SurveyMeasurement, StaticRecord)
 UNFIT = NodeFlag.YAW_UNTRUSTED | NodeFlag.CLOCK_UNSYNCHRONISED
 REST, STOP, TURNING = 10.0, 80.0, 20.0  # s, before the string turns, of a stop after it, of a turn
 MINUTES = float(os.environ.get("BORECHAIN_CHIP_MINUTES", "2"))
@@ -65,58 +52,6 @@ pytestmark = [
     needs("arm-none-eabi-gcc", "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
     needs("qemu-system-arm", "qemu-system-arm"),
 ]
-
-
-class Surface(Process):
-    """The base station: it keeps all that it hears, and receipts what is to be receipted."""
-
-    loop: OwnClockLoop
-
-    def __init__(self) -> None:
-        self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
-        self.heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self.kept: list[Any] = []
-
-    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
-        for received in self.endpoint.receive(side, frame, now, margin):
-            if isinstance(received.message, Event | SurveyMeasurement | StaticRecord):
-                self.endpoint.mail.acknowledge(received.message)
-            self.heard.put(received.message)
-
-    def first(self, kind: type, fits: Callable[[Any], bool], patience: float = PATIENCE) -> Any:
-        """The next message of a kind that fits."""
-        deadline = time.monotonic() + patience
-        while True:
-            message = self.heard.get(timeout=max(deadline - time.monotonic(), 0.0))
-            self.kept.append(message)
-            if isinstance(message, kind) and fits(message):
-                return message
-
-    def order(self, tube: int, number: int, name: str, **arguments: Any) -> Reply:
-        """What a tube answers to an order."""
-        command = Command(tube, number, name, arguments)
-        self.loop.call(lambda process, now: process.endpoint.mail.command(command, now))
-        reply: Reply = self.first(Reply, lambda r: r.sequence == number and r.tube == tube)
-        return reply
-
-
-@contextlib.contextmanager
-def living(bus: ZenohBus) -> Iterator[Surface]:
-    """The base station on a bus, in a thread of its own."""
-    surface, running = Surface(), queue.SimpleQueue[OwnClockLoop]()
-
-    async def live() -> None:
-        ports = neighbour_ports(ZenohMedium(bus), RIG, BASE, {Side.LOWER: ENCODER})
-        loop = OwnClockLoop(surface, ports, OwnClock(), CycleTiming(), PERIOD)
-        running.put(loop)
-        await loop.run()
-
-    thread = threading.Thread(target=lambda: event_loop.run_event_loop(live()))
-    thread.start()
-    surface.loop = running.get(timeout=PATIENCE)
-    yield surface
-    surface.loop.stop()
-    thread.join()
 
 
 def world_of(begin: float) -> World:
@@ -199,7 +134,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def surface_and_string(tmp_path: Path, program: Path) -> Iterator[tuple[Surface, String]]:
     register_loopback()
     endpoint = free_endpoint()
-    with open_router(endpoint) as bus, running_hub() as hub, living(bus) as surface:
+    with open_router(endpoint) as bus, running_hub() as hub, living(Surface(receipts=RECEIPTS), bus, RIG) as surface:
         string = String(tmp_path, endpoint, hub, program)
         string.start_all()
         try:

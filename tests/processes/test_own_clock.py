@@ -6,70 +6,38 @@ import contextlib
 import datetime
 import json
 import math
-import queue
 import re
 import shutil
 import signal
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
 from forked_commands import Command as Forked
+from own_clock_surface import Surface, living
 from rigs import PATIENCE, first_answer, free_endpoint, run, started, started_by
 
 from borechain.pki.access import read_access
 from borechain.pki.rig_keys import add_tube, init_rig
 from groundstation.service.disk.ground_store import Store
-from node.kernels.arithmetic.formats import PERIOD
 from node.process.encoder_command import encoder
 from node.process.tube_command import node
 from node.process.tube_process import TubeProcess
 from sim.can.can_hub import running_hub
 from sim.world.recording import record_sensors, turning_once, yaw_error
-from telemetry.application.endpoint import Endpoint
-from telemetry.application.seals import Seals, seals_of
+from telemetry.application.seals import seals_of
 from telemetry.media.can_timing import BitRates
 from telemetry.media.credentials import credentials_of
-from telemetry.media.neighbours import neighbour_ports
 from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
-from telemetry.media.zenoh_port import ZenohMedium
-from telemetry.messages import BASE, ENCODER, EPOCH_UNKNOWN, Command, Event, NodeFlag, NodeState, Reply, Side
-from telemetry.runtime import event_loop
-from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
-from telemetry.runtime.process_interface import Process
-from telemetry.runtime.timing import CycleTiming
+from telemetry.messages import BASE, EPOCH_UNKNOWN, Command, Event, NodeFlag, NodeState, Reply, Side
 
 RIG = "own-clock"
 UNFIT = NodeFlag.YAW_UNTRUSTED | NodeFlag.CLOCK_UNSYNCHRONISED
-
-
-class Surface(Process):
-    """The base station; what it hears goes into a queue."""
-
-    loop: OwnClockLoop
-
-    def __init__(self, seals: Seals | None = None) -> None:
-        self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1, seals=seals)
-        self.heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
-
-    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
-        for received in self.endpoint.receive(side, frame, now, margin):
-            if isinstance(received.message, Event):
-                self.endpoint.mail.acknowledge(received.message)
-            self.heard.put(received.message)
-
-    def first(self, kind: type, fits: Callable[[Any], bool]) -> Any:
-        """The next message of a kind that fits."""
-        deadline = time.monotonic() + PATIENCE
-        while True:
-            message = self.heard.get(timeout=max(deadline - time.monotonic(), 0.0))
-            if isinstance(message, kind) and fits(message):
-                return message
 
 
 class String:
@@ -138,27 +106,8 @@ def string(tmp_path: Path, router: tuple[str, ZenohBus]) -> Iterator[String]:
 
 @pytest.fixture
 def surface(router: tuple[str, ZenohBus]) -> Iterator[Surface]:
-    with living(Surface(), router[1]) as surface:
+    with living(Surface(), router[1], RIG) as surface:
         yield surface
-
-
-@contextlib.contextmanager
-def living(surface: Surface, bus: ZenohBus) -> Iterator[Surface]:
-    """The base station on a bus, in a thread of its own."""
-    running: queue.SimpleQueue[OwnClockLoop] = queue.SimpleQueue()
-
-    async def live() -> None:
-        ports = neighbour_ports(ZenohMedium(bus), RIG, BASE, {Side.LOWER: ENCODER})
-        loop = OwnClockLoop(surface, ports, OwnClock(), CycleTiming(), PERIOD)
-        running.put(loop)
-        await loop.run()
-
-    thread = threading.Thread(target=lambda: event_loop.run_event_loop(live()))
-    thread.start()
-    surface.loop = running.get(timeout=PATIENCE)
-    yield surface
-    surface.loop.stop()
-    thread.join()
 
 
 def test_a_node_finds_its_yaw_keeps_it_over_kills_of_both_and_ends_when_asked(
@@ -252,7 +201,7 @@ def test_a_sealed_string_on_can_is_heard_over_tls(tmp_path: Path) -> None:
     with (
         open_router(endpoint, credentials_of(keys, "router"), read_access(keys)),
         open_client(endpoint, PATIENCE, credentials_of(keys, "base")) as bus,
-        living(Surface(seals_of(keys, BASE, [Side.LOWER])), bus) as surface,
+        living(Surface(seals_of(keys, BASE, [Side.LOWER])), bus, RIG) as surface,
         running_hub(BitRates(500_000.0, 2_000_000.0)) as hub,
         contextlib.ExitStack() as stack,
     ):
