@@ -1,11 +1,12 @@
 """Reports in other languages: every phrase is in the tables of words, names stay, page 1 says what it has to."""
 
+import functools
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from forked_commands import run
@@ -62,22 +63,42 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+class Said(NamedTuple):
+    """Reports of a wall of 20, of five of its columns and of a hole in one language, and what they say."""
+
+    documents: list[Document]
+    contents: list[dict[str, Any]]
+    texts: list[str]  # of these and of two certificates
+    drawn: list[str]  # in every picture of them
+
+
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory, record: Path) -> Any:
-    """A wall of 20, five of its columns and a hole, in any language."""
+def said(tmp_path_factory: pytest.TempPathFactory, record: Path) -> Callable[[str], Said]:
+    """The same wall and hole in any language; each is set once."""
     wall = read_wall(write_wall(tmp_path_factory.mktemp("wall")))
     judgement, answer = judge_wall(wall), api.answer_survey(SurveyRequest(record))
+    records = [one for one in column_records(wall, judgement) if one.design.name in SHOWN]
 
-    def documents(language: str) -> list[Document]:
-        origin = origin_in(language)
-        records = [
-            one for one in column_records(wall, judgement) if one.design.name in ("P01", "P03", "P06", "P10", "P15")
-        ]
-        columns = [column_report(one, site_of(wall), origin) for one in records]
-        papers = HolePapers("Station to Station", "R-17", "")
-        return [wall_report(wall, judgement, origin), *columns, hole_report(answer, papers, origin)]
+    @functools.cache
+    def in_language(language: str) -> Said:
+        origin, drawn = origin_in(language), []
 
-    return documents
+        def keep(figure: Any, language: str) -> Any:
+            shown = translate_figure(figure, language)
+            drawn.extend(text.get_text() for text in shown.findobj(Text))
+            return shown
+
+        with pytest.MonkeyPatch.context() as patch:
+            for module in (figure_words, figure_panels):
+                patch.setattr(module, "translate_figure", keep)
+            columns = [column_report(one, site_of(wall), origin) for one in records]
+            hole = hole_report(answer, HolePapers("Station to Station", "R-17", ""), origin)
+            documents = [wall_report(wall, judgement, origin), *columns, hole]
+            contents = [document_content(one) for one in documents]
+            told = [text for one in (*contents, *certificates(language)) for text in texts(one)]
+        return Said(documents, contents, told, drawn)
+
+    return in_language
 
 
 def certificates(language: str) -> Iterator[dict[str, Any]]:
@@ -120,59 +141,36 @@ def test_no_title_of_a_picture_is_cut(tmp_path: Path) -> None:
         assert extent.y1 <= figure.bbox.y1
 
 
-def said_in(made: Any, language: str) -> tuple[list[str], list[str]]:
-    """Every text of the reports and certificates, and every text inside their pictures."""
-    drawn: list[str] = []
-
-    def keep(figure: Any, language: str) -> Any:
-        said = translate_figure(figure, language)
-        drawn.extend(text.get_text() for text in said.findobj(Text))
-        return said
-
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (figure_words, figure_panels):
-            patch.setattr(module, "translate_figure", keep)
-        said = [text for one in made(language) for text in texts(document_content(one))]
-        said += [text for one in certificates(language) for text in texts(one)]
-    return said, drawn
-
-
-@pytest.fixture(scope="module")
-def in_english(made: Any) -> tuple[list[str], list[str]]:
-    return said_in(made, "en")
-
-
 @pytest.mark.parametrize("language", OTHERS)
-def test_no_english_phrase_is_left(made: Any, in_english: tuple[list[str], list[str]], language: str) -> None:
-    (english, drawn), (other, drawn_other) = in_english, said_in(made, language)
-    assert len(english) == len(other)
-    left = {a for a, b in zip(english, other, strict=True) if a == b} - NAMES - set(SAME[language].split())
+def test_no_english_phrase_is_left(said: Callable[[str], Said], language: str) -> None:
+    english, other = said("en"), said(language)
+    assert len(english.texts) == len(other.texts)
+    left = {a for a, b in zip(english.texts, other.texts, strict=True) if a == b} - NAMES - set(SAME[language].split())
     assert {text for text in left if not NO_WORD.fullmatch(text)} == set()
-    assert {"Plan", "Worst joints", "design axis", "residual, deg/s"} < set(drawn)
-    left = {a for a, b in zip(drawn, drawn_other, strict=True) if a == b} - NAMES
+    assert {"Plan", "Worst joints", "design axis", "residual, deg/s"} < set(english.drawn)
+    left = {a for a, b in zip(english.drawn, other.drawn, strict=True) if a == b} - NAMES
     assert {text for text in left if not (NO_WORD.fullmatch(text) or DRAWN.fullmatch(text))} == set()
-    for a, b in zip(drawn, drawn_other, strict=True):
+    for a, b in zip(english.drawn, other.drawn, strict=True):
         assert sorted(re.findall(r"\d[\d.]*\d|\d", a)) == sorted(re.findall(r"\d[\d.]*\d|\d", b)), (a, b)
 
 
 @pytest.mark.parametrize("language", OTHERS)
-def test_numbers_stay_as_they_are(made: Any, language: str) -> None:
-    for one, other in zip(made("en"), made(language), strict=True):
-        pairs = zip(texts(document_content(one)), texts(document_content(other)), strict=True)
-        for a, b in pairs:
+def test_numbers_stay_as_they_are(said: Callable[[str], Said], language: str) -> None:
+    for one, other in zip(said("en").contents, said(language).contents, strict=True):
+        for a, b in zip(texts(one), texts(other), strict=True):
             assert sorted(re.findall(r"-?\d[\d.]*\d|\d", a)) == sorted(re.findall(r"-?\d[\d.]*\d|\d", b)), (a, b)
 
 
 @pytest.mark.parametrize("language", OTHERS)
-def test_names_of_people_stay_as_they_are(made: Any, language: str) -> None:
-    content = document_content(made(language)[-1])
+def test_names_of_people_stay_as_they_are(said: Callable[[str], Said], language: str) -> None:
+    content = said(language).contents[-1]
     shown = [text for _, text in content["facts"]]
     assert {"Bohr and Sons", "City railways", "Station to Station", "D-17", "B"} <= set(shown)
     assert content["subject"] == "Station to Station"
 
 
-def test_the_first_page_says_what_is_not_stated_and_what_the_sigma_holds(made: Any) -> None:
-    wall, column, *_, hole = (dict(document_content(one)["facts"]) for one in made("en"))
+def test_the_first_page_says_what_is_not_stated_and_what_the_sigma_holds(said: Callable[[str], Said]) -> None:
+    wall, column, *_, hole = (dict(content["facts"]) for content in said("en").contents)
     for facts in (wall, column, hole):
         assert (facts["Document"], facts["Revision"], facts["Contractor"]) == ("D-17", "B", "Bohr and Sons")
     assert wall["Serial and calibration of the instruments"] == "stated of all 19 columns that were surveyed"
@@ -200,8 +198,8 @@ def test_a_column_says_when_it_was_surveyed_and_what_of_its_data_hardly_can_be(t
     assert whole["Times of the surveys"] == "stated of all 19 columns that were surveyed"
 
 
-def test_a_hole_has_a_report_of_its_own(made: Any) -> None:
-    hole = made("en")[-1]
+def test_a_hole_has_a_report_of_its_own(said: Callable[[str], Said]) -> None:
+    hole = said("en").documents[-1]
     found = re.fullmatch(
         r"The hole ends at 30 m: north (\S+) ± (\S+) m, east (\S+) ± (\S+) m, down (\S+) ± (\S+) m, 95 % each",
         hole.verdict,
@@ -249,28 +247,15 @@ def test_a_warning_stands_on_the_report_of_a_hole(tmp_path: Path) -> None:
 )
 def test_a_warning_and_what_is_not_stated_are_said_in_every_language(text: str, language: str) -> None:
     """Each number and name once, and none of the English words."""
-    said = word_table(language).text(text)
-    assert sorted(re.findall(r"-?\d+\.?\d*", said)) == sorted(re.findall(r"-?\d+\.?\d*", text))
-    english = {
-        "the",
-        "station",
-        "left",
-        "out",
-        "stands",
-        "for",
-        "from",
-        "leans",
-        "expected",
-        "most",
-        "stated",
-        "spacing",
-    }
-    assert not english & set(re.findall(r"[a-z]+", said)) - ({"station"} if language == "fr" else set())
+    told = word_table(language).text(text)
+    assert sorted(re.findall(r"-?\d+\.?\d*", told)) == sorted(re.findall(r"-?\d+\.?\d*", text))
+    english = set(re.findall("[a-z]+", "the station left out stands for from leans expected most stated spacing"))
+    assert not english & set(re.findall(r"[a-z]+", told)) - ({"station"} if language == "fr" else set())
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
-def test_every_report_is_set_and_alike_twice(made: Any, language: str) -> None:
-    hole = made(language)[-1]
+def test_every_report_is_set_and_alike_twice(said: Callable[[str], Said], language: str) -> None:
+    hole = said(language).documents[-1]
     assert report_pdf(hole) == report_pdf(hole)
     assert len(report_pages(hole, 20.0)) == 2
     for content in certificates(language):
