@@ -11,12 +11,12 @@ from hand_fed import FOLLOWED, TOLD, Rig
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tapes import write
+from told_rig import azimuths, drilled, item, order, started_again
 
 from groundstation.config import checked_config
 from groundstation.errors import ConfigurationError, SelectorError, StoreError
 from groundstation.recording.ground_replay import replay_file
 from groundstation.recording.recording_file import Recording
-from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.setup.setup_book import SetupBook
 from groundstation.service.setup.setup_correction import chain_of, corrected_yaw
 from groundstation.service.setup.setup_items import setup_items
@@ -33,39 +33,6 @@ from telemetry.messages import NodeFlag
 
 NOTHING_TOLD = dict.fromkeys(TOLD)
 ANY_YAW = math.pi**2 / 3.0  # rad^2, second moment of an angle that is uniform on the circle
-
-
-def drilled(folder: Path, stops: int = 2, **more: Any) -> Rig:
-    """A hole that leans 2 deg to north, as the tube at the bit surveyed it."""
-    rig = Rig(folder, target=20.0, **more)
-    rig.run(5.0)
-    for stop in range(1, stops + 1):
-        rig.drill(stop, 2.0)
-    return rig
-
-
-def order(rig: Rig, name: str, **parameters: object) -> str:
-    """What became of an order of anna's."""
-    texts = {key: str(value) for key, value in parameters.items()}
-    return rig.ground.operator.order(name, texts, "anna").detail
-
-
-def azimuths(rig: Rig) -> list[float]:
-    return [row["azimuth_deg"] for row in rig.ask("stations")["stations"]]
-
-
-def item(rig: Rig, name: str) -> dict[str, Any]:
-    return next(row for row in rig.ask("setup")["items"] if row["item"] == name)
-
-
-def started_again(rig: Rig) -> Rig:
-    """The same rig after its ground station was killed: nothing of it is left but its database."""
-    settings_ = rig.ground.config
-    rig.ground.store.close()
-    rig.ground = GroundProcess(settings_)
-    rig.run(5.0)
-    rig.speak(len(rig.hops))
-    return rig
 
 
 def test_without_north_the_answer_is_dont_know_with_its_name(tmp_path: Path) -> None:
@@ -391,90 +358,3 @@ def test_a_yaw_has_the_angles_and_the_errors_of_the_joints_above_it_each_by_itse
         found = corrected_yaw(said, chain_of(tube, tubes[:place][::-1]), book)
         assert found[0] == pytest.approx(turn, abs=1e-12)
         assert found[1] == pytest.approx(var, rel=1e-9)
-
-
-UNCHECKED: dict[str, Any] = {"north_check_deg": None, "north_check_std_deg": None}
-
-
-def test_a_north_that_was_told_once_is_a_doubt_until_a_second_bearing_checks_it(tmp_path: Path) -> None:
-    rig = drilled(tmp_path, **UNCHECKED)
-    verdict, setup = rig.ask("verdict"), rig.ask("setup")
-    assert (verdict["verdict"], verdict["doubts"]) == ("dont_know", ["unchecked"])
-    assert verdict["line"] == "DON'T KNOW: north was told once, check it by a second bearing"
-    assert (setup["ready"], setup["missing"], setup["unchecked"]) == (False, [], ["north"])
-    assert setup["hold"] == "not checked: north"
-    assert setup["todo"] == "check north: cmd/north?action=check;angle_deg=..;sigma_deg=.."
-    before = rig.ask("stations")["stations"]
-    detail = order(rig, "north", action="check", angle_deg=0.1, sigma_deg=0.2)
-    assert detail.startswith("the check of north is 0.1 ± 0.2 deg")
-    assert detail.endswith("it bears out what was told")
-    assert azimuths(rig) == pytest.approx([row["azimuth_deg"] for row in before], abs=1e-9)
-    assert rig.ask("verdict")["verdict"] == verdict["by_surveys"]
-    assert rig.ask("setup")["ready"]
-    assert item(rig, "north")["check"] == "checked by 0.1 ± 0.2 deg of anna"
-    assert item(started_again(rig), "north")["check"] == "checked by 0.1 ± 0.2 deg of anna"
-    assert order(rig, "setup", action="undo").startswith("the check of north is taken back")
-    assert rig.ask("verdict")["doubts"][0] == "unchecked"
-
-
-@pytest.mark.parametrize(
-    ("told_deg", "sigma_deg", "check_deg", "check_sigma_deg", "apart"),
-    [
-        (40.0, 0.1, 41.0, 0.1, 7),  # by a degree: 1 / hypot(0.1, 0.1) = 7.07
-        (40.0, 0.1, 130.0, 1.0, 90),
-        (0.2, 0.3, 358.0, 0.4, 4),  # the shorter way round: 2.2 / 0.5
-        (40.0, 0.3, 41.7, 0.4, 0),  # 1.7 / 0.5 = 3.4: may be
-        (359.9, 0.1, 0.1, 0.1, 0),
-    ],
-)
-def test_a_check_that_is_further_off_than_both_may_err_is_a_contradiction(
-    tmp_path: Path, told_deg: float, sigma_deg: float, check_deg: float, check_sigma_deg: float, apart: int
-) -> None:
-    rig = drilled(tmp_path, 1, north_deg=told_deg, north_std_deg=sigma_deg, **UNCHECKED)
-    detail = order(rig, "north", action="check", angle_deg=check_deg, sigma_deg=check_sigma_deg)
-    verdict, setup = rig.ask("verdict"), rig.ask("setup")
-    assert (f"{apart} sigma apart: one of the two is wrong" in detail) == bool(apart)
-    assert ("contradiction" in verdict["doubts"]) == bool(apart) == (not setup["ready"])
-    if not apart:
-        return
-    assert setup["contradicted"] == [verdict["why"][0]]
-    assert setup["hold"] == setup["contradicted"][0]
-    order(rig, "north", action="tell", angle_deg=check_deg, sigma_deg=0.5)
-    assert "contradiction" not in rig.ask("verdict")["doubts"]
-
-
-def test_nothing_counts_as_better_known_than_its_check_and_the_smallest_slip_that_it_shows_is_said(
-    tmp_path: Path,
-) -> None:
-    rig = drilled(tmp_path, north_std_deg=0.1, stick_up_std_m=0.01, **UNCHECKED)
-    sure, deep = item(rig, "north")["toe_cm"], item(rig, "stick_up")
-    assert (item(rig, "north")["least_slip"], deep["check"]) == (None, "not checked: the bit at the collar's edge is")
-    order(rig, "north", action="check", angle_deg=0.0, sigma_deg=1.0)
-    order(rig, "stick_up", action="check", height_m=0.005, sigma_m=0.02)
-    north, stick_up = item(rig, "north"), item(rig, "stick_up")
-    assert (north["sigma"], stick_up["sigma"]) == (1.0, 0.02)
-    assert north["toe_cm"] == pytest.approx(10.0 * sure, rel=0.02)
-    assert north["least_slip"] == pytest.approx(3.5 * math.hypot(0.1, 1.0), rel=1e-5)
-    assert stick_up["least_slip"] == pytest.approx(3.5 * math.hypot(0.01, 0.02), rel=1e-5)
-    order(rig, "north", action="check", angle_deg=0.0, sigma_deg=0.05)
-    assert item(rig, "north")["sigma"] == 0.1
-
-
-def test_a_stick_up_that_is_told_no_better_than_one_that_was_not_needs_no_check(tmp_path: Path) -> None:
-    rig = drilled(tmp_path, 1)
-    assert rig.ask("setup")["unchecked"] == []
-    order(rig, "stick_up", action="tell", height_m=0.0, sigma_m=0.1)
-    assert rig.ask("setup")["unchecked"] == []
-    order(rig, "stick_up", action="tell", height_m=0.0, sigma_m=0.02)
-    assert rig.ask("setup")["unchecked"] == ["stick_up"]
-    assert "unchecked" in rig.ask("verdict")["doubts"]
-
-
-def test_a_check_of_what_was_not_told_and_one_without_its_sigma_are_refused(tmp_path: Path) -> None:
-    rig = drilled(tmp_path, 1)
-    with pytest.raises(SelectorError, match="stick_up: expected it to be told before it is checked"):
-        order(rig, "stick_up", action="check", height_m=0.0, sigma_m=0.02)
-    with pytest.raises(SelectorError, match="sigma"):
-        order(rig, "north", action="check", angle_deg=0.0)
-    with pytest.raises(ConfigurationError, match="expected north_check_deg and north_check_std_deg together"):
-        checked_config(folder=tmp_path, north_check_deg=3.0)
