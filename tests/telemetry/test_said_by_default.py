@@ -69,7 +69,7 @@ def test_every_message_is_in_the_list() -> None:
 def test_numbers_that_stand_for_something_else_stay_apart() -> None:
     assert (messages.ENCODER, messages.MAX_TUBE, messages.BASE) == (0, 250, 251)
     assert (messages.HOPS_UNKNOWN, messages.EPOCH_UNKNOWN) == (-1, 0)
-    assert messages.UNKNOWN_YAW_STD**2 == pytest.approx((2.0 * math.pi) ** 2 / 12.0)  # a uniform angle's
+    assert pytest.approx((2.0 * math.pi) ** 2 / 12.0) == messages.UNKNOWN_YAW_STD**2  # a uniform angle's
     assert messages.CONTENT_SIZE == 16
     assert messages.SEGMENT_SIZE * messages.MAX_SEGMENTS == 6144
 
