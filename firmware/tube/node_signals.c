@@ -12,7 +12,7 @@
 #define TORQUE_Q 20
 #define NEVER (-(INT64_C(1) << 62))
 #define UNTOLD (INT64_C(1) << 56)            /* rad^2, 1: a joint that may be any */
-#define YAW_VAR_FLOOR INT64_C(21949847)      /* (0.001 deg)^2 in Q56 */
+#define YAW_VAR_FLOOR INT64_C(21949998)      /* (0.001 deg)^2 in Q56 */
 #define LARGEST_CLOCK_VAR INT64_C(100000000000000) /* us^2, 1e2 s^2 */
 #define HIGHEST_ANGLE_LEVEL 255u
 #define HIGHEST_TIME_LEVEL 511u

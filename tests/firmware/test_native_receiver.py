@@ -155,6 +155,8 @@ FIRST, SECOND, THIRD = (packed_identifier(2, 2, NEIGHBOUR, part) for part in ran
 @example([(FIRST, bytes(8)), (THIRD, bytes(8)), (SECOND, bytes(2))])
 @example([(FIRST, bytes(12)), (SECOND, bytes(2))])
 @example([(FIRST, bytes(264)), (SECOND, bytes(2))])
+@example([(FIRST, b"\5" + bytes(7)), (SECOND, b"\6\0"), (FIRST, b"\6" + bytes(7))])  # of two messages
+@example([(FIRST, b"\5" + bytes(7)), (SECOND, b"\6\0"), (FIRST, b"\5" + bytes(7)), (SECOND, b"\5\0")])
 @example([(packed_identifier(5, 5, NEIGHBOUR, 10), bytes(8))])
 @example([(packed_identifier(1, 6, NEIGHBOUR, 0), b"x")])
 @example([(packed_identifier(1, 2, NEIGHBOUR, FD_PART), b"x" * 12)])

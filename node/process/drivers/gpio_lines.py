@@ -74,6 +74,8 @@ class ChipLines:
         """Edges that have come since the last call, in their order."""
         try:
             return read_edges(self._file)
+        except SensorError:  # bytes that are no events: the chip is there
+            raise
         except OSError as error:
             raise SensorError(f"gpio: {self._chip}: {error.strerror}: the chip is gone") from error
 
