@@ -171,6 +171,14 @@ def test_every_cell_of_the_columns(report: Document) -> None:
     ]
 
 
+def test_a_column_is_shown_where_it_uses_most_of_its_tolerance_and_not_at_its_toe(wall: Wall) -> None:
+    """B turns back below 2 m, leaning as far to the other side: its toe is as far off and allowed more."""
+    hole = wall.holes[1]
+    back = replace(hole, azimuth=np.radians([200.0, 200.0, 20.0]))
+    document = wall_report(replace(wall, holes=[wall.holes[0], back, *wall.holes[2:]]), judgement_of(wall), origin())
+    assert tuple(section(document, "Columns: set out, and as built").rows[1][5:]) == used("B", 2.0)
+
+
 def test_every_cell_of_the_joints(report: Document) -> None:
     joints = section(report, "Joints")
     assert list(joints.columns) == ["joint", "known as", "thinnest m", "at m", "P(too thin)", "at m"]
