@@ -230,6 +230,13 @@ def test_instruments_and_how_it_closed(report: Document, wall: Wall) -> None:
     assert [row[2] for row in closing.rows] == ["0.0", f"{100.0 * 6 / 15:.1f}", f"{100.0 * 9 / 15:.1f}"]
 
 
+def test_columns_of_one_instrument_that_do_not_stand_side_by_side_are_named_one_by_one(tmp_path: Path) -> None:
+    heads = HEADS.replace("B,0,0.9,,,,,", "B,0,0.9,,R-18,K-40,,").replace("E,0,3.6,,R-18,K-40,,", "E,0,3.6,,,,,")
+    wall = read_wall(write_wall(tmp_path, WALL, heads))
+    document = wall_report(wall, judgement_of(wall), origin())
+    assert [row[3] for row in section(document, "Instruments").rows] == ["A, C, E", "B"]
+
+
 def test_voids_of_a_grid(wall: Wall) -> None:
     voids = [
         VoidFinding(2.0, Void((0, 1, 2), 0.0123, (0.1, 0.2), 0.05)),
