@@ -26,6 +26,7 @@ Array = npt.NDArray[np.float64]
 CONFIDENCE = 0.95
 CHECKED = "nothing is missing, and nothing is beyond what steel does"
 CONTAINED = "errors of the instrument and of setting out; no mistakes"
+NO_INSTRUMENT = "none, the column was not surveyed"
 CLAUSES = {
     "en-12716": "EN 12716, execution of jet grouting: 50 mm at the head and 2 % of the length drilled",
     "5-cm": "50 mm at every depth",
@@ -174,7 +175,7 @@ def _design_facts(record: ColumnRecord, site: ReportSite) -> list[tuple[str, str
 def instrument_facts(record: ColumnRecord) -> list[tuple[str, str]]:
     """Facts on the instrument that surveyed a column, and on its calibration."""
     if not math.isfinite(record.surveyed_md):
-        return [("Error model", "none, the column was not surveyed")]
+        return [("Error model", NO_INSTRUMENT)]
     tool = record.tool
     return [
         ("Error model", f"{tool.name}: {tool.title}"),
@@ -187,6 +188,7 @@ def instrument_facts(record: ColumnRecord) -> list[tuple[str, str]]:
 def paper_facts(record: ColumnRecord) -> list[tuple[str, str]]:
     """What the first page says of the instrument and of the ±."""
     told = " / ".join(text or NOT_STATED for text in (record.serial, record.calibration))
+    told = told if math.isfinite(record.surveyed_md) else NO_INSTRUMENT
     return [
         ("Times of the surveys", times_words(record)),
         ("Serial and calibration of the instruments", told),

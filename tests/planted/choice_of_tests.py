@@ -12,6 +12,11 @@ from defect_lists import Defect, DefectError
 COSTLY = ("processes", "studies", "page", "gauntlet", "truth", "planted", "tools")  # folders that are named, not chosen
 FEW = 3  # files; where fewer import the module itself, those are added that import who imports it
 MOST = 6  # files
+WHOLE = {  # quick tests that look at a whole room: without importing it, or from a folder of which none is chosen
+    "borechain/cli/": ("test_options_whole.py",),
+    "borechain/gauntlet/": ("gauntlet/test_oracles_by_hand.py", "gauntlet/test_wellness_by_hand.py"),
+    "borechain/studies/": ("studies/test_studies_whole.py",),
+}
 IMPORT = re.compile(r"^ *(?:from|import) ([\w.]+)(?: import ([\w, ]*))?", re.MULTILINE)
 
 
@@ -24,15 +29,16 @@ def choose_tests(defect: Defect, root: Path) -> list[str]:
         return list(defect.tests)
     module = defect.file.removesuffix(".py").replace("/", ".")
     wanted = {module}
-    chosen: list[str] = []
+    chosen = [test for room, tests in WHOLE.items() if defect.file.startswith(room) for test in tests]
+    at_most = MOST + len(chosen)
     for _ in range(2):
         chosen += _nearest_first(module, root, wanted, chosen)
-        if len(chosen) >= FEW:
+        if len(chosen) >= FEW + at_most - MOST:
             break
         wanted = {user for user, uses in _imports_of_sources(root).items() if uses & wanted}
     if not chosen:
         raise DefectError(f"{defect.name}: expected tests that import {defect.file}, found none; name them")
-    return chosen[:MOST]
+    return chosen[:at_most]
 
 
 def _nearest_first(module: str, root: Path, wanted: set[str], known: Collection[str]) -> list[str]:

@@ -60,6 +60,17 @@ def test_a_file_without_tests_is_named() -> None:
         choose_tests(Defect("a name", "one", 1, "telemetry/keys.py", "a", "b", ("nowhere.py",)), ROOT)
 
 
+def test_who_looks_at_a_whole_room_is_chosen_beside_who_imports_the_module() -> None:
+    for file, test in (
+        ("borechain/cli/survey/clearance_command.py", "test_options_whole.py"),
+        ("borechain/studies/judged_hole.py", "studies/test_studies_whole.py"),
+    ):
+        assert choose_tests(Defect("a name", "one", 1, file, "a", "b"), ROOT)[0] == test
+    assert "test_options_whole.py" not in choose_tests(
+        Defect("a name", "one", 1, "borechain/crew/app.py", "a", "b"), ROOT
+    )
+
+
 SOURCE = '''"""± 1 < 2 of a docstring, which is no part of it."""
 LIMIT: Final = 3
 
