@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+RIG_STAMP := $(VENV)/.rig
 # sizes of `make soak` (h of rig time) and `make seeds`
 SOAK ?= 168
 FROM ?= 50000
@@ -20,7 +21,7 @@ help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-20s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 rig:  ## set up, with a bar, and drill wellbore 1
-	@$(MAKE) --question $(STAMP) 2> /dev/null || $(PYTHON) deploy/set_up_shown.py $(VENV) $(MAKE) $(STAMP)
+	@$(MAKE) --question $(RIG_STAMP) 2> /dev/null || $(PYTHON) deploy/set_up_shown.py $(VENV) $(MAKE) $(RIG_STAMP)
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
 
 test:  ## set up and run every check and every test, in parallel
@@ -31,20 +32,29 @@ quick: $(STAMP)  ## lint, types, contracts and the fast tests: under 90 s
 	$(MAKE) --jobs=4 check fast
 
 # the lock is complete, so nothing is left to resolve; uv installs it in a tenth of the time, and where uv finds no index
-# (it does not read pip's settings) pip does. What is imported is compiled then, and the rest never. What compiles kernels
-# comes first: `make rig` has them compiled beside the rest
+# (it does not read pip's settings) pip does. What is imported is compiled then, and the rest never. A rig needs a third
+# of it, and what compiles kernels comes first: `make rig` has them compiled beside the rest. The pip outside installs
+# into the environment, whose own takes 3 s to make and is left to what builds wheels
 LOCKED := --no-deps --require-hashes --requirement
-INSTALL = $(BIN)/uv pip install --python $(BIN)/python --quiet $(LOCKED) $(1) \
-  || $(BIN)/python -m pip install --quiet --no-compile $(LOCKED) $(1)
-$(STAMP): requirements.lock pyproject.toml
-	$(PYTHON) -m venv $(VENV)
-	awk '/^[a-z0-9]/ { own = /^uv==/ } own' requirements.lock > $(VENV)/uv.lock
-	awk '/^[a-z0-9]/ { own = /^(numba|llvmlite|numpy)==/ } own' requirements.lock > $(VENV)/compiler.lock
-	$(BIN)/python -m pip install --quiet --no-compile $(LOCKED) $(VENV)/uv.lock
-	$(call INSTALL,$(VENV)/compiler.lock)
+HAS_PIP := $(PYTHON) -c "import pip" 2> /dev/null
+PIP = $(shell $(HAS_PIP) && echo $(PYTHON) -m pip --python $(BIN)/python || echo $(BIN)/python -m pip)
+INSTALL = $(BIN)/uv pip install --python $(BIN)/python --quiet $(1) || $(PIP) install --quiet --no-compile $(1)
+PICK = awk 'NR == FNR { wanted[$$1]; next } /^[a-z0-9]/ { split($$1, name, "=="); own = name[1] in wanted } own'
+$(RIG_STAMP): requirements.lock pyproject.toml deploy/rig-packages.txt
+	$(HAS_PIP) && $(PYTHON) -m venv --without-pip $(VENV) || $(PYTHON) -m venv $(VENV)
+	echo uv | $(PICK) - requirements.lock > $(VENV)/uv.lock
+	printf '%s\n' numba llvmlite numpy | $(PICK) - requirements.lock > $(VENV)/compiler.lock
+	$(PICK) deploy/rig-packages.txt requirements.lock > $(VENV)/rig.lock
+	$(PIP) install --quiet --no-compile $(LOCKED) $(VENV)/uv.lock
+	$(call INSTALL,$(LOCKED) $(VENV)/compiler.lock)
 	touch $(VENV)/.compiler
-	$(call INSTALL,requirements.lock)
-	$(BIN)/python -m pip install --quiet --no-compile --no-build-isolation --no-deps --editable .
+	$(call INSTALL,$(LOCKED) $(VENV)/rig.lock)
+	$(call INSTALL,--no-build-isolation --no-deps --editable .)
+	touch $@
+
+$(STAMP): $(RIG_STAMP)
+	$(BIN)/python -m ensurepip --default-pip > /dev/null
+	$(call INSTALL,$(LOCKED) requirements.lock)
 	touch $@
 
 check: lint types contracts  ## lint, types and import contracts
@@ -146,6 +156,8 @@ lock:  ## pin the dependencies again, without addresses (needs pip-tools)
 	pip-compile --quiet --upgrade --generate-hashes --all-extras --allow-unsafe --strip-extras --no-annotate \
 	  --no-header --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-emit-options \
 	  --output-file requirements.lock pyproject.toml
+	$(BIN)/uv pip compile --quiet --extra ground --extra build --constraint requirements.lock --no-annotate --no-header \
+	  --no-emit-index-url pyproject.toml | sed 's/[^a-z0-9-].*//' | sort > deploy/rig-packages.txt
 
 clean:  ## remove the environment and every cache
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

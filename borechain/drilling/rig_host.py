@@ -17,7 +17,7 @@ from borechain.pki.access import MEDIUM, ROUTER, read_access
 from sim.rig.transports import Transports
 from telemetry import keys
 from telemetry.media.credentials import Credentials, credentials_for
-from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
+from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router, use_few_threads
 from telemetry.media.zenoh_port import CONNECT_TIMEOUT
 from telemetry.runtime.hosting import Place, begin_process, on_termination, reporting_errors, write_warning
 
@@ -34,12 +34,14 @@ def run_medium(
     cued: bool = False,
     transports: Transports | None = None,
     hole: str = "",
+    near: str = "",
 ) -> None:
     """World, joints and clock; in a rig without an outside router its session is the router.
 
     ``cued`` says that a launcher has started all processes and plays the operator; without one, the rig waits for every
     process to join, since compiling takes an unknown time. ``transports`` says which joints are not on zenoh, ``hole``
-    which one of the scenario's site is drilled.
+    which one of the scenario's site is drilled. At the endpoint ``near`` its session is the router of the tubes: no
+    process stands between it and them.
     """
     from sim.rig.bus_stepper import BusStepper
     from sim.rig.rig_progress import RigProgress
@@ -57,7 +59,11 @@ def run_medium(
             world = World(found.drilling(hole) if hole else found, seed)
         if router:
             session = opened_router(place.endpoint, place.keys)
+        elif near:
+            use_few_threads(routes=True)
+            session = open_router(near, beyond=place.endpoint)
         else:
+            use_few_threads()
             credentials = credentials_for(place.endpoint, place.keys, MEDIUM)
             session = open_client(place.endpoint, CONNECT_TIMEOUT, credentials)
         with session as bus:

@@ -64,18 +64,24 @@ def drill_in_processes(
 def process_table(
     world: World, job: RigJob, folder: Path, page: PageSettings | None, transports: Transports, steps: Path
 ) -> ProcessTable:
-    """Every process of the rig, one line each; ``steps`` is the socket at which they meet their stepper."""
+    """Every process of the rig, one line each; ``steps`` is the socket at which they meet their stepper.
+
+    Without keys the tubes meet at a socket beside it, where the stepper itself is the router, with no process between.
+    With keys it is the launcher for all, since certificates say there who may do what.
+    """
     key_file = new_key(folder / "rig.key") if job.keys_place is None else None
+    near = f"unixsock-stream/{steps.with_name('frames')}" if job.keys_place is None else ""
 
     def place(name: str, address: int = BASE) -> Place:
         media = transports.media_of(address)
         home = private_folder(folder, name)
-        return Place(job.rig_name, job.endpoint, home, key_file, media, steps, job.keys_place)
+        endpoint = job.endpoint if address == BASE or not near else near
+        return Place(job.rig_name, endpoint, home, key_file, media, steps, job.keys_place)
 
     specs = {
         "medium": Spec(
             run_medium,
-            (place("medium"), job.scenario, job.seed, job.speed, job.faults, False, True, transports, job.hole),
+            (place("medium"), job.scenario, job.seed, job.speed, job.faults, False, True, transports, job.hole, near),
         ),
         "encoder": Spec(run_encoder, (place("encoder", ENCODER), None, None, world.torque_settings(), world.reach)),
         "base": Spec(partial(run_ground, page=page), (place("ground"), settings_of(world, job))),

@@ -25,6 +25,8 @@ LINE = 16  # batches that wait for a line, the most that zenoh allows; made when
 ONE_POOL = (
     "(app: (worker_threads: 1), acc: (handover: app), tx: (handover: app), rx: (handover: app), net: (handover: app))"
 )
+# a router waits for room in a line on the thread that receives, so that another one has to empty the line
+TWO_POOLS = "(rx: (worker_threads: 1), app: (handover: rx), acc: (handover: rx), net: (handover: rx))"
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,21 +239,27 @@ def stay_known() -> None:
         ctypes.pythonapi.PyGILState_Ensure()
 
 
-def use_few_threads() -> None:
+def use_few_threads(*, routes: bool = False) -> None:
     """Share one thread pool among the sessions of this process: for boards, and many processes on one machine.
 
-    Call it before the first session is opened; an existing environment setting wins.
+    Where one of them ``routes`` for others, what is sent has a pool of its own. Call it before the first session is
+    opened; an existing environment setting wins.
     """
-    os.environ.setdefault("ZENOH_RUNTIME", ONE_POOL)
+    os.environ.setdefault("ZENOH_RUNTIME", TWO_POOLS if routes else ONE_POOL)
 
 
 @contextmanager
 def open_router(
-    endpoint: str, credentials: Credentials | None = None, access: dict[str, Any] | None = None
+    endpoint: str,
+    credentials: Credentials | None = None,
+    access: dict[str, Any] | None = None,
+    *,
+    beyond: str | None = None,
 ) -> Iterator[ZenohBus]:
     """Session in router mode that listens on ``endpoint`` and serves the others; no router program is needed.
 
-    With ``credentials`` it asks every client for its certificate; ``access`` is zenoh's access control.
+    With ``credentials`` it asks every client for its certificate; ``access`` is zenoh's access control. It joins the
+    router at ``beyond``, where there is one: who is at either is heard at both.
 
     Raises
     ------
@@ -259,6 +267,8 @@ def open_router(
         When the endpoint cannot be listened on.
     """
     settings: dict[str, Any] = {"listen/endpoints": [endpoint], "listen/exit_on_failure": True}
+    if beyond is not None:
+        settings |= {"connect/endpoints": [beyond]}
     if credentials is not None:
         settings |= tls_of_router(credentials)
     if access is not None:

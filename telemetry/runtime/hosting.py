@@ -141,6 +141,7 @@ def run_stepped(name: str, place: Place, address: int, build: Callable[[], Proce
     What is wrong with its options, recordings or folder is found before anything is connected.
     """
     begin_process(name)
+    use_few_threads()
     with reporting_errors(name):
         make_folder(place)
         process = build()

@@ -308,6 +308,32 @@ def test_a_long_payload_takes_no_shared_memory() -> None:
     assert ".zenoh" not in mapped  # as the files of zenoh's segments are called
 
 
+def test_who_is_at_one_of_two_joined_routers_is_heard_at_both(tmp_path: Path) -> None:
+    """As the tubes of a stepped rig at their stepper, and the crew at the launcher."""
+    near = f"unixsock-stream/{tmp_path / 'frames'}"
+    heard: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
+    come: queue.SimpleQueue[tuple[str, bool]] = queue.SimpleQueue()
+    with (
+        zenoh_place() as endpoint,
+        open_router(near, beyond=endpoint),
+        open_client(near, PATIENCE) as tube,
+        open_client(endpoint, PATIENCE) as crew,
+    ):
+        crew.liveliness_subscribe("alive/*", lambda key, alive: come.put((key, alive)))
+        take_back = tube.liveliness_token("alive/tube")
+        assert come.get(timeout=PATIENCE) == ("alive/tube", True)
+        for name, here, there in (("up", tube, crew), ("down", crew, tube)):
+            there.subscribe(name, lambda key, payload: heard.put((key, payload)))
+            publisher = here.publisher(name)
+            deadline = time.monotonic() + PATIENCE
+            while not publisher.is_heard:
+                assert time.monotonic() < deadline
+            publisher.put(bytes(100_000))
+            assert heard.get(timeout=PATIENCE) == (name, bytes(100_000))
+        take_back()
+        assert come.get(timeout=PATIENCE) == ("alive/tube", False)
+
+
 def test_an_end_in_memory_has_one_port() -> None:
     with open_medium("memory:taken") as medium:
         port = medium.open_port(UPPER)
