@@ -9,9 +9,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from string_passes import knowing, passes
 from test_store import survey, url
 
 from groundstation.config import GroundConfig
+from groundstation.service.alarms.watch import Watch
 from groundstation.service.answers.csv_tables import csv_cell
 from groundstation.service.disk.ground_store import Store, is_depth
 from groundstation.service.disk.keeper import StringKeeper
@@ -19,8 +21,10 @@ from groundstation.service.disk.merged_database import merge_databases
 from groundstation.service.orders.order_book import RECORD_EMPTY, OrderBook, OrderState, SentOrder
 from groundstation.service.string.depth import DepthLog
 from groundstation.service.string.known_string import KnownString
+from groundstation.survey.fusion.fusion import Weighting
 from telemetry.application.commands import find_command
 from telemetry.messages import DepthReading, Event, NodeFlag, NodeMode, NodeState, Severity, Stand
+from telemetry.presentation.msgpack_codec import encode_message
 
 EPOCH = 7
 IDENTITIES = {
@@ -63,6 +67,35 @@ def test_every_damaged_message_counts_once(tmp_path: Path) -> None:
     with contextlib.closing(Store(url(tmp_path))) as again:
         assert [one.message.sequence for one in again.messages()] == [1, 3]
         assert again.damaged == 3
+
+
+@pytest.mark.parametrize("bit", [0, 7])
+def test_a_message_of_which_any_bit_has_changed_is_not_read_and_is_taken_again(tmp_path: Path, bit: int) -> None:
+    """Most changed bits leave a message that can be read, with another number in it."""
+    message = survey(1, 1)
+    sound = encode_message(message)
+    with contextlib.closing(Store(url(tmp_path))) as store:
+        store.add_message(message, 1.0)
+        for byte in range(len(sound)):
+            rotten = sound[:byte] + bytes([sound[byte] ^ 1 << bit]) + sound[byte + 1 :]
+            with contextlib.closing(sqlite3.connect(tmp_path / "ground.sqlite")) as database:
+                database.execute("update messages set payload = ?", (rotten,))
+                database.commit()
+            store.damaged = 0
+            assert (list(store.messages()), store.damaged) == ([], 1)
+        assert store.add_message(message, 1.0)
+        assert [one.message for one in store.messages()] == [message]
+
+
+def test_every_damaged_line_of_a_setup_and_of_alarms_counts_once(tmp_path: Path) -> None:
+    Store(url(tmp_path)).close()
+    with contextlib.closing(sqlite3.connect(tmp_path / "ground.sqlite")) as database:
+        database.executemany("insert into setup values (?, ?)", [(1, "{"), (2, "[]"), (3, "none")])
+        database.executemany("insert into alarms values (?, ?)", [(1, "{"), (2, "none")])
+        database.commit()
+    with contextlib.closing(Store(url(tmp_path))) as store:
+        assert (store.told(), store.damaged) == ([], 3)
+        assert (list(store.alarms()), store.damaged) == ([], 5)
 
 
 def test_a_stand_is_written_when_it_begins_and_when_it_has_ended_and_at_no_reading_between(tmp_path: Path) -> None:
@@ -153,6 +186,19 @@ def test_a_told_stand_is_taken_down_to_where_the_string_reaches_and_no_deeper(
     assert 0.0 < deepest < math.inf
     string.on_told_stand(Stand(EPOCH, 50.0, 90.0, deepest + above), 95.0)
     assert [stand.md for stand in string.depths.stands] == ([deepest + above] if is_taken else [])
+
+
+@pytest.mark.parametrize("weighting", [Weighting.ADJUSTED, Weighting.BAYES])
+def test_what_is_wrong_with_an_adjusted_hole_is_an_alarm_and_of_one_that_is_fused_it_is_none(
+    tmp_path: Path, weighting: Weighting
+) -> None:
+    """Two stations of a hole moved before the last stop; what is adjusted beside a fused hole is asked for alone."""
+    moved = passes(6, lambda stop, station: 2.0 if stop == 6 and station in (1, 2) else 1.0)
+    settings = {"mount_tilt_std_deg": 0.01, "accelerometer_bias_std_deg": 0.002, "weighting": weighting}
+    model = knowing(tmp_path, moved, 6, **settings)
+    Watch(model.string, model.hole, model.placement, model.rig_alarms, 10.0).look(100.0)
+    told = [alarm.subject for alarm in model.rig_alarms if alarm.kind.code == "blunder"]
+    assert told == (["hole"] if weighting is Weighting.ADJUSTED else [])
 
 
 @pytest.mark.parametrize("by", ["=1+1", "@SUM(A1)", "+1+1", "-2+3", "=cmd|'/c calc'!A1"])

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from telemetry.errors import KeyFileError
+from telemetry.media.port import MAX_FRAME
 from telemetry.runtime.marked_frames import MarkedFrames, mark_frame
 from telemetry.transport.authentication import read_key
-from telemetry.transport.hop import Header, HopLink, pack_frame
+from telemetry.transport.hop import ENTRY_BYTES, Header, HopLink, pack_frame
 
 
 def test_what_a_dead_process_left_half_said_is_forgotten_found_or_waiting() -> None:
@@ -34,6 +35,14 @@ def test_a_key_file_that_is_not_there_or_no_text_is_one_line_with_its_reason(
         path.chmod(0o600)
     with pytest.raises(KeyFileError, match=reason):
         read_key(path)
+
+
+@pytest.mark.parametrize("beyond", [0, 1])
+def test_payloads_share_a_frame_as_large_as_one_may_be_less_a_kibibyte(beyond: int) -> None:
+    link = HopLink(1, 1)
+    for topic, size in (("a", 20_000), ("b", MAX_FRAME - 1024 - 2 * ENTRY_BYTES - 20_000 + beyond)):
+        link.send_best_effort(bytes(size), topic)
+    assert len(link.take_frames(100.0)) == 1 + beyond
 
 
 @pytest.mark.parametrize("address", [3, 200])
