@@ -110,6 +110,7 @@ REASONS: dict[str, Callable[[GauntletRig, Row], bool]] = {
     "survey_untrusted": _was_untrusted,
     "survey_unplaced": _was_unplaced,
     "numbers_lost": _was_lost,
+    "database": lambda rig, _: bool(rig.disk(BASE).handled),  # a disk that rots is told until the next start
     "tube_sensor": lambda rig, row: bool(set(_numbers(row["subject"])) & unready_tubes(rig)),
     "blunder": lambda rig, _: bool(rig.world.deceptions),
     "joint": lambda rig, _: bool(rig.world.deceptions),

@@ -112,6 +112,12 @@ KINDS: tuple[FaultKind, ...] = (
             ("length-wrong", "a tube is told to be 0.1 to 0.5 m longer than it is", deceptions.length_wrong),
         )
     ),
+    FaultKind(
+        "database-rots",
+        "single bits of messages in the database change",
+        power.power_cut([BASE], power.rot_messages),
+        LOST_DATABASE,
+    ),
 )
 KIND_OF = {kind.name: kind for kind in KINDS}
 LASTING = frozenset({"encoder-slips", *EXPECTED})  # that no repair of a crew takes back
@@ -139,6 +145,7 @@ ANSWERS: dict[str, str] = {
     "same-number": "numbers of two series are kept apart by their content",
     "database-deleted": "the string is learnt anew; the tubes are asked for what is missing",
     "database-old": "the tubes are asked for the numbers that the backup lacks",
+    "database-rots": "damage is found by the content's hash; the tubes are asked for what is damaged",
     "clock-jumps": "the exchange of time finds it; the yaw is taken anew where it matters",
     "clock-drifts": "the clock filter follows",
     "loss": "frames are repeated",

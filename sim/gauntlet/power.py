@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import sqlite3
 from collections.abc import Callable, Iterable
 
 import numpy as np
@@ -12,6 +14,7 @@ from telemetry.messages import BASE, ENCODER
 
 Handle = Callable[[Faulty, int, np.random.Generator], None]
 REFUSALS = (errno.ENOSPC, errno.EROFS)
+ROTTEN = 4  # messages of a database that are damaged at once, at most
 
 
 def keep_disk(rig: Faulty, address: int, random: np.random.Generator) -> None:
@@ -118,6 +121,21 @@ def restore_backup(rig: Faulty, address: int, random: np.random.Generator) -> No
     if disk.backups:
         backup = disk.backups[int(random.integers(len(disk.backups)))]
         disk.replace("ground.sqlite", backup)
+
+
+def rot_messages(rig: Faulty, address: int, random: np.random.Generator) -> None:
+    """Change a bit of the payload of some messages of the database; one at least, where it holds any."""
+    disk = rig.disk(address)
+    with contextlib.closing(sqlite3.connect(":memory:")) as database:
+        for name, image in disk.held("ground.sqlite").items():
+            database.deserialize(image)
+            rows = database.execute("SELECT id, payload FROM messages ORDER BY id").fetchall()
+            for row in random.permutation(len(rows))[: int(random.integers(1, ROTTEN + 1))]:
+                number, payload = rows[row][0], bytearray(rows[row][1])
+                payload[int(random.integers(len(payload)))] ^= 1 << int(random.integers(8))
+                database.execute("UPDATE messages SET payload = ? WHERE id = ?", (bytes(payload), number))
+            database.commit()
+            disk.replace(name, database.serialize())
 
 
 def refused_disk(*addresses: int) -> Draw:

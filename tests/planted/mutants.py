@@ -30,6 +30,33 @@ AREAS = {
         "telemetry/application/depth_seal.py",
     ),
 }
+# what a rig is trusted for; of these defects of whole statements are drawn as well
+TRUSTED = {
+    "service": tuple(
+        f"groundstation/{room}"
+        for room in ("service/alarms", "service/orders", "service/process", "service/string", "gateway/lease.py")
+    ),
+    "store": ("groundstation/service/disk",),
+    "link": (
+        "telemetry/transport/hop.py",
+        "telemetry/transport/upload.py",
+        *(
+            f"telemetry/application/{name}.py"
+            for name in ("delivery_rules", "end_to_end", "endpoint", "endpoint_state", "outbox", "place", "series")
+        ),
+        "telemetry/runtime/inbox.py",
+        "telemetry/runtime/marked_frames.py",
+    ),
+    "keys": (
+        *(f"borechain/pki/{name}.py" for name in ("access", "certificates", "persons", "private_files", "rig_keys")),
+        *(
+            f"telemetry/transport/{name}.py"
+            for name in ("authentication", "certificate_dates", "joint_seal", "key_ring", "seal")
+        ),
+        *(f"telemetry/application/{name}.py" for name in ("depth_seal", "end_seal", "measurement_seal", "seals")),
+        *(f"groundstation/gateway/page/{name}.py" for name in ("passwords", "request_guard", "sessions")),
+    ),
+}
 COMPILED = "kernels"  # folders of these are compiled anew for each change, and their defects are switched instead
 COMPARISONS = {
     "<": "<=",
@@ -175,9 +202,40 @@ class Changes(ast.NodeVisitor):
         return self._lines[node.end_lineno - 1] + node.end_col_offset  # type: ignore[attr-defined]
 
 
-def changes_of(file: Path) -> list[Change]:
+class WiderChanges(Changes):
+    """Those of whole statements as well: a call or a refusal that is left out, branches or arguments exchanged."""
+
+    def visit_Expr(self, node: ast.Expr) -> None:
+        """A call that is left out."""
+        if isinstance(node.value, ast.Call):
+            self._replace(node, "pass")
+        self.generic_visit(node)
+
+    def visit_Raise(self, node: ast.Raise) -> None:
+        """A refusal that is left out."""
+        self._replace(node, "pass")
+
+    def visit_IfExp(self, node: ast.IfExp) -> None:
+        """The other branch."""
+        self._exchange(node.body, node.orelse)
+        self.generic_visit(node)
+
+    def visit_Call(self, node: ast.Call) -> None:
+        """The first two arguments exchanged."""
+        if len(node.args) > 1 and not any(isinstance(one, ast.Starred) for one in node.args[:2]):
+            self._exchange(*node.args[:2])
+        self.generic_visit(node)
+
+    def _exchange(self, one: ast.expr, other: ast.expr) -> None:
+        begin, end = self._at(one), self._end(other)
+        texts = [self._source[self._at(part) : self._end(part)].decode() for part in (other, one)]
+        between = self._source[self._end(one) : self._at(other)].decode()
+        self.found.append(Change(begin, end, between.join(texts)))
+
+
+def changes_of(file: Path, kinds: type[Changes] = Changes) -> list[Change]:
     """Every change of one file, in the order of its text."""
-    return sorted(set(Changes(file.read_bytes()).found), key=lambda c: (c.begin, c.end, c.new))
+    return sorted(set(kinds(file.read_bytes()).found), key=lambda c: (c.begin, c.end, c.new))
 
 
 def mutant_of(root: Path, area: str, file: Path, change: Change) -> Mutant:
@@ -201,10 +259,19 @@ def drawn_mutants(root: Path, size: int, seed: int) -> list[Mutant]:
     return sorted(drawn, key=lambda m: m.name)
 
 
+def drawn_of_trusted(root: Path, size: int, seed: int) -> list[Mutant]:
+    """So many mutants, as many of each area of what a rig is trusted for."""
+    drawn, draw = [], random.Random(seed)
+    for area in TRUSTED:
+        found = [(file, change) for file in files_of(root, area) for change in changes_of(file, WiderChanges)]
+        drawn += [mutant_of(root, area, *one) for one in draw.sample(found, size // len(TRUSTED))]
+    return sorted(drawn, key=lambda m: m.name)
+
+
 def files_of(root: Path, area: str) -> Sequence[Path]:
     """Sources of an area."""
     files: list[Path] = []
-    for place in AREAS[area]:
+    for place in (AREAS | TRUSTED)[area]:
         path = root / place
         files += sorted(path.rglob("*.py")) if path.is_dir() else [path]
     return [file for file in files if COMPILED not in file.parts]

@@ -14,7 +14,7 @@ from collections import defaultdict
 from pathlib import Path
 
 from defect_lists import ROOT, DefectError
-from mutants import drawn_mutants
+from mutants import drawn_mutants, drawn_of_trusted
 from run_planted import LIBRARIES, PASSES, judge_all
 
 
@@ -23,6 +23,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--size", type=int, default=300, help="of the sample")
     parser.add_argument("--seed", type=int, default=52, help="that draws it")
+    parser.add_argument("--trusted", action="store_true", help="of service, store, link and keys, statements too")
+    parser.add_argument("--list", dest="listed", action="store_true", help="name them, and judge nothing")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="at a time")
     parser.add_argument("--fast", action="store_true", help="without the tests that are marked slow")
     parser.add_argument("--only", default="", metavar="PATTERN", help="those whose line holds it")
@@ -31,7 +33,11 @@ def main() -> int:
     arguments = parser.parse_args()
     for library in LIBRARIES.split():
         importlib.import_module(library)
-    mutants = [one for one in drawn_mutants(ROOT, arguments.size, arguments.seed) if arguments.only in one.name]
+    drawn = (drawn_of_trusted if arguments.trusted else drawn_mutants)(ROOT, arguments.size, arguments.seed)
+    mutants = [one for one in drawn if arguments.only in one.name]
+    if arguments.listed:
+        print("\n".join(f"{one.package}  {one.name}" for one in mutants))
+        return 0
     found: dict[str, list[bool]] = defaultdict(list)
     survivors = []
     try:

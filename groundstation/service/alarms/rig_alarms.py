@@ -91,6 +91,9 @@ KINDS: tuple[AlarmKind, ...] = (
     ),
     AlarmKind("depth_refused", BAD, "readings of the depth are refused"),
     AlarmKind("depth_silent", BAD, "no depth comes any more"),
+    AlarmKind(
+        "depth_stands", DEGRADED, "the string has turned for a minute and the depth has not moved: does it stick?"
+    ),
     AlarmKind("depth_contradicts", BAD, "the depth does not fit the tubes in the hole"),
     AlarmKind("disk", BAD, "the ground station's database refuses; nothing is acknowledged until it takes"),
     AlarmKind("lease", BAD, "it is not sure that this is still the ground station of the rig: it takes in nothing"),

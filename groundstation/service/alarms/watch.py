@@ -11,6 +11,7 @@ from groundstation.service.hole.examined_hole import UNSOLVED
 from groundstation.service.hole.placement import UNTRUSTED, Placement
 from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.service.string.depth import CONTRADICTION
+from groundstation.service.string.idle_turning import IdleTurning
 from groundstation.service.string.known_string import KnownString
 from groundstation.service.string.message_numbers import Range
 from groundstation.survey.fusion.joint_angles import Pair, RestingYaw
@@ -69,6 +70,7 @@ class Watch:
         self._contradictions = 0
         self._gaps: dict[int, Gap] = {}
         self._cross_check = EncoderCrossCheck()
+        self._idle_turning = IdleTurning()
         self._told_unplaced: set[int] = set()  # tubes
         self._doubled: set[int] = set()  # numbers that two tubes give themselves, as told
         self._told_back: set[float] = set()  # m, stations that turn back
@@ -99,6 +101,7 @@ class Watch:
         hold("tube_disk", tube, "its disk refuses" if NodeFlag.NOT_SAVED in state.flags else "")
         hold("clock", tube, self._clock_fault(state))
         self._look_at_joint(state)
+        self._idle_turning.on_state(state, self._string.bit)
         if state.tube in self._string.doubled:
             return  # what both have numbered comes under one number
         if self._numbers.on_told(state.tube, state.numbered):
@@ -286,6 +289,7 @@ class Watch:
         why = "no reading comes" if was_heard else "not heard since the ground station started"
         self._alarms.hold("depth_silent", "depth", why if silent else "")
         bit = string.bit
+        self._alarms.hold("depth_stands", "depth", "" if silent else self._idle_turning.told(bit))
         comparable = was_heard and not silent and string.knows_tubes
         misfit = string.tally.misfit(bit, string.heard) if bit is not None and comparable else ""
         by_surveys = self._hole.depth_misfit(self._depths.accepted_at(self._time.epoch))

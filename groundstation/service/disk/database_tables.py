@@ -33,7 +33,8 @@ MESSAGES = sa.Table(
 )
 SAME = sa.and_(*(MESSAGES.c[name] == sa.bindparam(f"its_{name}") for name in ("tube", "sequence", "content")))
 FIND, DROP, ADD = sa.select(MESSAGES.c.payload).where(SAME), sa.delete(MESSAGES).where(SAME), sa.insert(MESSAGES)
-ALL_MESSAGES = sa.select(MESSAGES.c.payload, MESSAGES.c.md, MESSAGES.c.below).order_by(MESSAGES.c.id)
+OF_A_MESSAGE = (MESSAGES.c.content, MESSAGES.c.payload, MESSAGES.c.md, MESSAGES.c.below)
+ALL_MESSAGES = sa.select(*OF_A_MESSAGE).order_by(MESSAGES.c.id)
 PLACE = sa.update(MESSAGES).where(SAME).values(md=sa.bindparam("depth"))
 STANDS = sa.Table(
     "stands",

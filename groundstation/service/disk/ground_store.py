@@ -128,13 +128,9 @@ class Store(Database):
     def messages(self) -> Iterator[Stored[Kept]]:
         """Everything stored, in the order of arrival; what is damaged is passed over and counted."""
         with self._refusing(), self._engine.connect() as connection:
-            for payload, md, below in connection.execute(ALL_MESSAGES):
-                try:
-                    message = decode_message(payload)
-                except DecodeError:
-                    self.damaged += 1
-                    continue
-                if isinstance(message, SurveyMeasurement | Event | StaticRecord) and is_depth(md):
+            for content, payload, md, below in connection.execute(ALL_MESSAGES):
+                message = kept_message(content, payload)
+                if message is not None and is_depth(md):
                     yield Stored(message, md, below)
                 else:
                     self.damaged += 1
@@ -350,6 +346,17 @@ def _stand_of(text: str) -> Stand:
 def row_of(message: Kept, payload: bytes) -> dict[str, Any]:
     """Identity of a message."""
     return {"tube": message.tube, "sequence": message.sequence, "content": content_of(payload).hex()}
+
+
+def kept_message(content: str, payload: bytes) -> Kept | None:
+    """Message of a stored payload; None of one that is damaged, also where a changed bit left other numbers."""
+    if content_of(payload).hex() != content:
+        return None
+    try:
+        message = decode_message(payload)
+    except DecodeError:
+        return None
+    return message if isinstance(message, SurveyMeasurement | Event | StaticRecord) else None
 
 
 def is_depth(value: object) -> bool:

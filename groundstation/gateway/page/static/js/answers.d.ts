@@ -774,7 +774,7 @@ export interface Alarm {
   /** how far it is */
   state: "raised" | "acknowledged" | "shelved" | "latched" | "cleared";
   /** kind: of the rig's, or deviation, projection */
-  code: "survey_untrusted" | "survey_set_aside" | "survey_unplaced" | "survey_refused" | "survey_missing" | "numbers_missing" | "numbers_lost" | "tube_counts_anew" | "tube_restarted" | "same_number" | "tube_silent" | "tube_sensor" | "tube_disk" | "tube_queue" | "clock" | "clock_back" | "epoch" | "reference" | "joint" | "belt" | "blunder" | "depth_refused" | "depth_silent" | "depth_contradicts" | "disk" | "lease" | "database" | "queue" | "bad_input" | "wrong_password" | "page_restarted" | "seal_refused" | "key_file" | "certificate" | "deviation" | "projection";
+  code: "survey_untrusted" | "survey_set_aside" | "survey_unplaced" | "survey_refused" | "survey_missing" | "numbers_missing" | "numbers_lost" | "tube_counts_anew" | "tube_restarted" | "same_number" | "tube_silent" | "tube_sensor" | "tube_disk" | "tube_queue" | "clock" | "clock_back" | "epoch" | "reference" | "joint" | "belt" | "blunder" | "depth_refused" | "depth_silent" | "depth_stands" | "depth_contradicts" | "disk" | "lease" | "database" | "queue" | "bad_input" | "wrong_password" | "page_restarted" | "seal_refused" | "key_file" | "certificate" | "deviation" | "projection";
   /** how much it matters */
   level: "notice" | "degraded" | "bad";
   /** what it is about */
@@ -848,7 +848,7 @@ export interface MovedStation {
 /** One alarm of the rig itself. */
 export interface RigAlarmRow {
   /** kind of alarm, see [operating](operate.md#what-the-crew-is-told) */
-  code: "survey_untrusted" | "survey_set_aside" | "survey_unplaced" | "survey_refused" | "survey_missing" | "numbers_missing" | "numbers_lost" | "tube_counts_anew" | "tube_restarted" | "same_number" | "tube_silent" | "tube_sensor" | "tube_disk" | "tube_queue" | "clock" | "clock_back" | "epoch" | "reference" | "joint" | "belt" | "blunder" | "depth_refused" | "depth_silent" | "depth_contradicts" | "disk" | "lease" | "database" | "queue" | "bad_input" | "wrong_password" | "page_restarted" | "seal_refused" | "key_file" | "certificate";
+  code: "survey_untrusted" | "survey_set_aside" | "survey_unplaced" | "survey_refused" | "survey_missing" | "numbers_missing" | "numbers_lost" | "tube_counts_anew" | "tube_restarted" | "same_number" | "tube_silent" | "tube_sensor" | "tube_disk" | "tube_queue" | "clock" | "clock_back" | "epoch" | "reference" | "joint" | "belt" | "blunder" | "depth_refused" | "depth_silent" | "depth_stands" | "depth_contradicts" | "disk" | "lease" | "database" | "queue" | "bad_input" | "wrong_password" | "page_restarted" | "seal_refused" | "key_file" | "certificate";
   /** how much it matters */
   level: "notice" | "degraded" | "bad";
   /** what it is about */
