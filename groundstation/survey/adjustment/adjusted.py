@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.kernels.path_elimination import path_covariances, reduce_right, substitute_path
-from groundstation.survey.adjustment.linear_solution import WIDE, LinearSolution
+from groundstation.survey.adjustment.linear_solution import LinearSolution
 from groundstation.survey.adjustment.looks import (
     OF_TUBE,
     TURN,
@@ -118,8 +118,6 @@ class Adjusted:
     @cached_property
     def common_vars(self) -> Array:
         """Variances (p,) of what stations have in common."""
-        if len(self.solution.in_common.right) < WIDE:
-            return np.diag(self.common_cov)
         return np.asarray(np.einsum("pk,pk->p", self.common_root, self.common_root))
 
     @cached_property

@@ -20,7 +20,7 @@ from groundstation.survey.adjustment.kernels.path_elimination import (
     reduce_right,
     substitute_path,
 )
-from groundstation.survey.adjustment.kernels.path_legs import add_legs, leg_departures, leg_squares, weigh_legs
+from groundstation.survey.adjustment.kernels.path_legs import add_legs, leg_departures, leg_squares
 from groundstation.survey.adjustment.kernels.position_sums import position_sums
 
 
@@ -56,7 +56,6 @@ def warm_adjustment() -> None:
     path_covariances(diagonal, tied, np.zeros((1, 4, 4)))
     legs, place = (diagonal[:0], diagonal[:0]), (tangents, bases, np.zeros((1, 2)))
     add_legs(*legs, one[:0], *place, diagonal, tied, np.zeros((1, 4)))
-    weigh_legs(*legs, coupled, coupled.copy(), coupled.copy())
     leg_departures(legs[0], *place, np.zeros((0, 4)))
     leg_squares(*legs, *place, diagonal, tied, diagonal.copy(), coupled, one[:0].copy(), one[:0].copy())
     position_sums(

@@ -11,11 +11,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.adjustment.kernels.path_elimination import (
-    divide_by_transposed,
-    take_image,
-    take_product,
-)
+from groundstation.survey.adjustment.kernels.path_elimination import divide_by_transposed
 from node.kernels.arithmetic.jit import allocating_kernel, kernel
 
 Array = npt.NDArray[np.float64]
@@ -149,29 +145,3 @@ def departed_squares(go: Array, rigid: Array, upper: Array, lower: Array, off: A
             for b in range(4):
                 total += off[a] * rigid[a, b] * off[b]
     return total
-
-
-@allocating_kernel
-def weigh_legs(go: Array, roots: Array, states: Array, departs: Array, weighed: Array) -> None:
-    """What changes of the states make every leg depart by, in its standard deviations, and the pull of that.
-
-    Parameters
-    ----------
-    go : (s, 4, 4), how a state goes on over each leg
-    roots : (s, 4, 4), lower Cholesky factors R of the information of each
-    states : (s + 1, 4, r)
-    departs : (s + 1, 4, r), zeros but for the first row; set to R^T of what each leg departs by
-    weighed : (s + 1, 4, r), added to: information of the legs times the states
-    """
-    off, pull, minus = np.empty(states.shape[1:]), np.empty(states.shape[1:]), np.empty((4, 4))
-    for k in range(len(go)):
-        for a in range(4):
-            for b in range(4):
-                minus[a, b] = -roots[k, a, b]
-        off[:] = states[k + 1]
-        take_image(go[k], states[k], off)
-        take_product(minus, off, departs[k + 1])
-        pull[:] = 0.0
-        take_image(minus, departs[k + 1], pull)
-        weighed[k + 1] += pull
-        take_product(go[k], pull, weighed[k])
