@@ -30,7 +30,7 @@ class InCommon:
 
     @cached_property
     def factor(self) -> Array:
-        """Lower Cholesky factor (p, p) of the information; what is above it is left over.
+        """Lower Cholesky factor (p, p) of the information.
 
         Raises
         ------
@@ -39,7 +39,8 @@ class InCommon:
         """
         from scipy.linalg import lapack
 
-        factor, failed = lapack.dpotrf(self.information.T, lower=1)  # symmetric: as the library lays out its matrices
+        # symmetric, so transposed it lies as the library lays out its matrices
+        factor, failed = lapack.dpotrf(self.information.T, lower=1, clean=1)
         if failed:
             raise np.linalg.LinAlgError("expected information that is positive definite")
         return np.asarray(factor)
@@ -58,7 +59,7 @@ class InCommon:
         """Root R (p, p) of the covariance R R^T, upper triangular: of the factor, and not of the covariance."""
         from scipy.linalg import lapack
 
-        return np.triu(lapack.dtrtri(self.factor, lower=1)[0].T)
+        return np.asarray(lapack.dtrtri(self.factor, lower=1)[0].T)
 
     def times_cov(self, columns: Array) -> Array:
         """Covariance times columns (p, r)."""

@@ -19,6 +19,19 @@ TINY = 1e-12
 
 
 @kernel
+def bend_to(before: Array, after: Array, basis: Array, out: Array) -> None:
+    """Set the bend (2), rad, from one direction (3,) to another along the great circle, in a basis (2, 3)."""
+    for a in range(2):
+        v = basis[a]
+        out[a] = v[0] * after[0] + v[1] * after[1] + v[2] * after[2]
+    size = math.sqrt(out[0] * out[0] + out[1] * out[1])
+    angle = math.atan2(size, before[0] * after[0] + before[1] * after[1] + before[2] * after[2])
+    scale = angle / size if size > TINY else 1.0
+    for a in range(2):
+        out[a] *= scale
+
+
+@kernel
 def leg_departure(k: int, go: Array, tangents: Array, bases: Array, curvatures: Array, out: Array) -> None:
     """Set by how much (4,) the station below a leg departs from what the one above it leads to.
 
@@ -28,15 +41,8 @@ def leg_departure(k: int, go: Array, tangents: Array, bases: Array, curvatures: 
     go : (s, 4, 4), how a state goes on over each leg
     tangents, bases, curvatures : (s + 1, 3), (s + 1, 2, 3) and (s + 1, 2) of collar and stations
     """
-    before, after = tangents[k], tangents[k + 1]
+    bend_to(tangents[k], tangents[k + 1], bases[k], out)
     for a in range(2):
-        v = bases[k, a]
-        out[a] = v[0] * after[0] + v[1] * after[1] + v[2] * after[2]
-    size = math.sqrt(out[0] * out[0] + out[1] * out[1])
-    angle = math.atan2(size, before[0] * after[0] + before[1] * after[1] + before[2] * after[2])
-    scale = angle / size if size > TINY else 1.0
-    for a in range(2):
-        out[a] *= scale  # the bend along the great circle
         out[2 + a] = curvatures[k + 1, a]
     for a in range(4):
         out[a] -= go[k, a, 2] * curvatures[k, 0] + go[k, a, 3] * curvatures[k, 1]
