@@ -24,8 +24,8 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.hole.examined_hole import UNSOLVED
 from groundstation.service.hole.hole_adjustment import number_values
 from groundstation.survey.adjustment import normal_equations
-from groundstation.survey.adjustment.linear_solution import WIDE
 from groundstation.survey.adjustment.looks import OF_TUBE
+from groundstation.survey.adjustment.normal_equations import WIDE
 from groundstation.survey.adjustment.tube_biases import bias_of_tube
 from groundstation.survey.fusion.fusion import Weighting
 

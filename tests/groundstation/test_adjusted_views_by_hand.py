@@ -141,7 +141,7 @@ def test_a_tube_as_all_surveys_show_it_is_in_thousandths_of_gravity(monkeypatch:
     step = SimpleNamespace(hypothesis=SimpleNamespace(kind=BlunderKind.BIAS_STEPPED, subject=(1,)), smallest=1.0)
     other = SimpleNamespace(hypothesis=SimpleNamespace(kind=BlunderKind.BIAS_STEPPED, subject=(0,)), smallest=2.0)
     examined: Any = SimpleNamespace(adjusted=None, tubes=[4, 6], reliabilities=[other, step])
-    found = adjustment_room.adjusted_tube(examined, 1)
+    found = adjustment_room.adjusted_tubes(examined)[1]
     milli = 9.80665e-3
     assert (found.tube, found.looks, found.unfound_step_cm) == (6, 6, pytest.approx(7.0))
     assert found.bias_mg == pytest.approx([0.01 / milli, 0.02 / milli, -0.03 / milli])
@@ -149,7 +149,7 @@ def test_a_tube_as_all_surveys_show_it_is_in_thousandths_of_gravity(monkeypatch:
     assert found.smallest_step_mg == pytest.approx(1.0 / milli)
     other.smallest, examined.tubes = math.inf, [4]
     monkeypatch.setattr(adjustment_room, "unfound_across", lambda one: math.inf)
-    none = adjustment_room.adjusted_tube(examined, 0)
+    none = adjustment_room.adjusted_tubes(examined)[0]
     assert (none.tube, none.smallest_step_mg, none.unfound_step_cm) == (4, None, None)
 
 

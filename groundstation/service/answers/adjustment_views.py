@@ -77,7 +77,7 @@ def answer_adjustment(k: RigModel, _p: Parameters) -> AdjustmentAnswer:
         parts=toe_parts(budget),
         left_out=LEFT_OUT,
         unfound=[least_found(examined, one) for one in worst_of_kinds(examined.reliabilities)],
-        tubes=[adjusted_tube(examined, place) for place in range(len(examined.tubes))],
+        tubes=adjusted_tubes(examined),
         next_stop=next_stop_advice(examined, budget),
     )
 
@@ -183,12 +183,15 @@ def least_found(examined: ExaminedHole, one: Reliability) -> LeastFound:
     )
 
 
-def adjusted_tube(examined: ExaminedHole, place: int) -> AdjustedTube:
-    """One tube as all surveys show it."""
-    bias = bias_of_tube(examined.adjusted, place)
-    steps = (one for one in examined.reliabilities if one.hypothesis.kind is STEP)
-    step = next(one for one in steps if one.hypothesis.subject == (place,))
-    unfound = unfound_across(step)
+def adjusted_tubes(examined: ExaminedHole) -> list[AdjustedTube]:
+    """Every tube as all surveys show it."""
+    steps = {one.hypothesis.subject[0]: one for one in examined.reliabilities if one.hypothesis.kind is STEP}
+    return [adjusted_tube(examined, place, steps[place]) for place in range(len(examined.tubes))]
+
+
+def adjusted_tube(examined: ExaminedHole, place: int, step: Reliability) -> AdjustedTube:
+    """One tube as all surveys show it, and how well a step of its bias at its last stop would be found."""
+    bias, unfound = bias_of_tube(examined.adjusted, place), unfound_across(step)
     return AdjustedTube(
         tube=int(examined.tubes[place]),
         bias_mg=(bias.bias / MILLI_G).tolist(),

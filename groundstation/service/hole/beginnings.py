@@ -60,20 +60,21 @@ class Beginnings:
             return None
         start, above = None, np.zeros(1, np.intp)
         for every, kept in zip(EVERY, self._kept, strict=True):
-            earlier = np.flatnonzero(looks.stop < int(looks.stop[-1]) // every * every)
-            if not len(earlier):
+            # looks are in the order of time, and so their stops are
+            earlier = slice(int(np.searchsorted(looks.stop, int(looks.stop[-1]) // every * every)))
+            if not earlier.stop:
                 return None  # many tubes, and few stops yet
-            used, station = np.unique(looks.station[earlier], return_inverse=True)
-            places = np.concatenate([[0], used]).astype(np.intp)
+            is_used = np.zeros(len(path.md), bool)
+            is_used[looks.station[earlier]] = is_used[0] = True
+            places = np.flatnonzero(is_used)
+            station = (np.cumsum(is_used) - 1)[looks.station[earlier]]
             its_path = replace(path, md=path.md[places])
             # a row keeps its readings, and gets another number of its tube where it is revised
             made_of = b"".join(
                 one.tobytes() for one in (numbers[earlier], rows["sequence"][earlier], station, its_path.md)
             )
             if kept.ended is None or kept.made_of != made_of:
-                part = self._look_at(
-                    rows[earlier], looks.force[earlier], station.astype(np.intp) + 1, its_path, kept.chains
-                )
+                part = self._look_at(rows[earlier], looks.force[earlier], station, its_path, kept.chains)
                 kept.made_of, kept.ended = made_of, _ended(part, start, np.searchsorted(places, above))
             start, above = kept.ended, places
         return None if start is None else grown_start(start, above, len(path.md), seen.string)

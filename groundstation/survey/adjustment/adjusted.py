@@ -8,11 +8,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.survey.adjustment.kernels.observations import take_step
 from groundstation.survey.adjustment.kernels.path_elimination import path_covariances, reduce_right, substitute_path
-from groundstation.survey.adjustment.linear_solution import WIDE, LinearSolution
+from groundstation.survey.adjustment.linear_solution import LinearSolution
 from groundstation.survey.adjustment.looks import (
-    OF_TUBE,
-    TURN,
     FurtherEffects,
     Looks,
     PathPrior,
@@ -118,8 +117,6 @@ class Adjusted:
     @cached_property
     def common_vars(self) -> Array:
         """Variances (p,) of what stations have in common."""
-        if len(self.solution.in_common.right) < WIDE:
-            return np.diag(self.common_cov)
         return np.asarray(np.einsum("pk,pk->p", self.common_root, self.common_root))
 
     @cached_property
@@ -135,21 +132,22 @@ class Adjusted:
     @cached_property
     def left(self) -> Array:
         """What the looks leave (n, 3), m/s^2: read less adjusted."""
-        return self.left_of(slice(None))
+        return self._left_of(self.looks, self.linear.jacobians, self.linear.residuals, self.extra.columns)
 
-    def left_of(self, rows: Places | slice) -> Array:
+    def left_of(self, rows: Places) -> Array:
         """The same of some looks (r,)."""
-        stepped = np.einsum("kab,kb->ka", self.linear.jacobians[rows], self._step_of_looks(rows))
-        further = self.extra.columns[rows] @ self.solution.common[self.string.width :]
-        return np.asarray(self.linear.residuals[rows] - stepped - further)
+        linear = self.linear
+        return self._left_of(
+            self.looks.part(rows), linear.jacobians[rows], linear.residuals[rows], self.extra.columns[rows]
+        )
 
-    def _step_of_looks(self, rows: Places | slice) -> Array:
-        """Last step of the nine unknowns of some looks (r, 9)."""
-        size, station = OF_TUBE * self.string.count, self.looks.station[rows]
-        tubes = self.solution.common[:size].reshape(-1, OF_TUBE)[self.looks.tube[rows]]
-        tubes[:, TURN] += self.solution.common[size + 1 + self.looks.make_up[rows]]
-        gravity = np.full((len(station), 1), self.solution.common[size])
-        return np.concatenate([self.solution.states[station, :2], tubes, gravity], axis=1)
+    def _left_of(self, looks: Looks, jacobians: Array, residuals: Array, further: Array) -> Array:
+        left = np.empty((len(looks), 3))
+        take_step(
+            looks.station, looks.tube, looks.make_up, jacobians, residuals, further, self.linear.gravity_at,
+            self.solution.states, self.solution.common, left,
+        )  # fmt: skip
+        return left
 
     def cofactor(self, directions: Array, common: Array) -> tuple[Array, Array]:
         """Covariance of all unknowns times columns: of directions (s + 1, 2, r) and of what is in common (p, r).

@@ -27,7 +27,7 @@ WIDE_COLLAR = 0.5  # rad, of a collar that was told wrong, before the stations t
 
 @dataclass(frozen=True, slots=True)
 class CollarDeparture:
-    """By how much (2,), rad, what was told stands off what the stations say, with its covariance (2, 2).
+    """By how much (2,), rad, what was told stands off what the stations say, and what is free (2, 2) to tell it.
 
     ``squares`` is chi-square of two degrees of freedom in an honest hole, or zero of none where ``told`` is: nothing
     beside it tells the collar. Its variance is that of how the hole bends and of what was told of mounts, and not one
@@ -35,9 +35,14 @@ class CollarDeparture:
     """
 
     size: Array
-    cov: Array
+    free: Array
     squares: float
     told: int
+
+    @property
+    def cov(self) -> Array:
+        """Covariance (2, 2), rad^2."""
+        return np.asarray(np.linalg.pinv(self.free), np.float64)
 
     def log_chance(self) -> float:
         """Logarithm of the chance that an honest hole departs as far, by how sharply holes bend."""
@@ -70,8 +75,7 @@ def collar_departure(found: Adjusted) -> CollarDeparture:
     down = go[0][:, :2]
     free = down.T @ weight @ own @ down
     sizes, _, told, squares = best_sizes(-(down.T @ weight @ pulled)[None], free[None], free[None])
-    cov = np.asarray(np.linalg.pinv(free), np.float64)
-    return CollarDeparture(sizes[0], cov, float(squares[0]), int(told[0]))
+    return CollarDeparture(sizes[0], free, float(squares[0]), int(told[0]))
 
 
 def collar_ties(found: Adjusted) -> tuple[CollarTie, ...]:

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.adjustment.kernels.path_legs import add_legs, leg_departures
+from groundstation.survey.adjustment.kernels.path_legs import add_legs, bend_to, leg_departures
 from groundstation.survey.adjustment.looks import (
     BIAS,
     OF_TUBE,
@@ -19,7 +19,6 @@ from groundstation.survey.adjustment.looks import (
     StartingPoint,
     StringPrior,
 )
-from groundstation.survey.adjustment.sphere import bends_between
 from groundstation.survey.path.curvature_process import process_step
 
 Array = npt.NDArray[np.float64]
@@ -59,13 +58,17 @@ def path_equations(path: PathPrior, start: StartingPoint, bases: Array) -> tuple
 
 def collar_bend(path: PathPrior, start: StartingPoint, bases: Array) -> Array:
     """Bend (2,), rad, from the direction at the collar to that which was told."""
-    return np.asarray(bends_between(np.stack([start.tangents[0], path.collar]), bases[:1].repeat(2, axis=0))[0])
+    bend = np.empty(2)
+    bend_to(start.tangents[0], path.collar, bases[0], bend)
+    return bend
 
 
 def known_collar(path: PathPrior, bases: Array) -> Array:
     """Information (2, 2) on the direction at the collar before any look."""
-    (a, b), (_, c) = (bases[0] @ path.collar_cov @ bases[0].T + KNOWN * np.eye(2)).tolist()
-    return np.asarray(np.array([[c, -b], [-b, a]]) / (a * c - b * b))
+    (a, b), (_, c) = (bases[0] @ path.collar_cov @ bases[0].T).tolist()
+    a, c = a + KNOWN, c + KNOWN
+    size = a * c - b * b
+    return np.array([[c / size, -b / size], [-b / size, a / size]])
 
 
 def leg_steps(path: PathPrior) -> tuple[Array, Array]:

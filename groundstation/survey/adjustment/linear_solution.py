@@ -13,7 +13,6 @@ from groundstation.survey.adjustment.kernels.observations import mirror_upper
 
 Array = npt.NDArray[np.float64]
 KEPT = ("factor", "cov", "root")  # of equations, whatever stands on their right side
-WIDE = 150  # unknowns, from which on Cholesky's factor is worth its calls: it takes half of what a general inverse does
 
 
 @dataclass(frozen=True)  # with a dictionary, for what is worked out once
@@ -31,7 +30,7 @@ class InCommon:
 
     @cached_property
     def factor(self) -> Array:
-        """Lower Cholesky factor (p, p) of the information; what is above it is left over.
+        """Lower Cholesky factor (p, p) of the information.
 
         Raises
         ------
@@ -40,7 +39,8 @@ class InCommon:
         """
         from scipy.linalg import lapack
 
-        factor, failed = lapack.dpotrf(self.information.T, lower=1)  # symmetric: as the library lays out its matrices
+        # symmetric, so transposed it lies as the library lays out its matrices
+        factor, failed = lapack.dpotrf(self.information.T, lower=1, clean=1)
         if failed:
             raise np.linalg.LinAlgError("expected information that is positive definite")
         return np.asarray(factor)
@@ -48,8 +48,6 @@ class InCommon:
     @cached_property
     def cov(self) -> Array:
         """Covariance (p, p)."""
-        if len(self.right) < WIDE:
-            return np.asarray(np.linalg.inv(self.information), np.float64)
         from scipy.linalg import lapack
 
         found = np.asarray(lapack.dpotri(self.factor, lower=1)[0]).T
@@ -58,26 +56,26 @@ class InCommon:
 
     @cached_property
     def root(self) -> Array:
-        """Root R (p, p) of the covariance R R^T: lower triangular, or of many unknowns upper triangular."""
-        if len(self.right) < WIDE:
-            return np.asarray(np.linalg.cholesky(self.cov))
+        """Root R (p, p) of the covariance R R^T, upper triangular: of the factor, and not of the covariance."""
         from scipy.linalg import lapack
 
-        return np.triu(lapack.dtrtri(self.factor, lower=1)[0].T)
+        return np.asarray(lapack.dtrtri(self.factor, lower=1)[0].T)
 
     def times_cov(self, columns: Array) -> Array:
         """Covariance times columns (p, r)."""
-        if len(self.right) < WIDE:
-            return np.asarray(self.cov @ columns)
         return np.asarray(self.root @ (self.root.T @ columns))
 
     def times_root(self, rows: Array) -> Array:
         """Rows (r, p) times the root."""
-        if len(self.right) < WIDE:
-            return np.asarray(rows @ self.root)
         from scipy.linalg import blas
 
         return np.asarray(blas.dtrmm(1.0, self.root, rows.T, trans_a=1).T)
+
+    def times_root_transposed(self, rows: Array) -> Array:
+        """Rows (r, p) times the transposed root: of rows times the root it is rows times the covariance."""
+        from scipy.linalg import blas
+
+        return np.asarray(blas.dtrmm(1.0, self.root, rows.T).T)
 
     def with_right(self, right: Array) -> InCommon:
         """The same equations with another right side; what was worked out of them is known."""
@@ -88,8 +86,6 @@ class InCommon:
     @cached_property
     def step(self) -> Array:
         """Solution (p,)."""
-        if len(self.right) < WIDE:
-            return np.asarray(self.cov @ self.right)
         from scipy.linalg import lapack
 
         return np.asarray(lapack.dpotrs(self.factor, self.right, lower=1)[0])

@@ -21,12 +21,13 @@ from groundstation.survey.adjustment.kernels.path_elimination import (
     reduce_right,
     substitute_path,
 )
-from groundstation.survey.adjustment.linear_solution import WIDE, InCommon, LinearSolution
+from groundstation.survey.adjustment.linear_solution import InCommon, LinearSolution
 from groundstation.survey.adjustment.looks import OF_TUBE, FurtherEffects, Looks, StartingPoint
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
 MANY = 1500  # looks, from which on later steps go by the equations of the first, whose right sides alone are made anew
+WIDE = 150  # unknowns in common, from which on it is worth to leave out columns of tubes that are zero
 TOGETHER = 64  # stations whose squares are summed at once
 GROSS = 16.27  # chi-square of three beyond which a look counts less: one in a thousand
 

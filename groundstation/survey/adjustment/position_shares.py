@@ -6,16 +6,13 @@ hole: what a position has in common with others is a running sum, and what is it
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, shares_of_string
-from groundstation.survey.adjustment.equations import known_collar, leg_steps
+from groundstation.survey.adjustment.equations import known_collar
 from groundstation.survey.adjustment.kernels.path_elimination import reduce_right, substitute_path
-from groundstation.survey.adjustment.kernels.path_legs import weigh_legs
 from groundstation.survey.adjustment.kernels.position_sums import position_sums
 from groundstation.survey.adjustment.run_of_stops import TurnCauses
 
@@ -33,10 +30,9 @@ def position_shares(found: Adjusted, causes: TurnCauses) -> list[ErrorShare]:
     causes : of the turns of tubes
     """
     halves, wholes = leg_halves(found.path.md)
-    by_common = _summed(found, found.by_common, halves, wholes)  # (s + 1, 3, p), of positions
-    flat = by_common.reshape(-1, by_common.shape[2])
-    common = flat @ found.common_cov
-    collar, path = _of_path(found, flat, common, halves, wholes)
+    rooted = _summed(found, found.direction_columns, halves, wholes)  # (s + 1, 3, p), of positions
+    common = found.solution.in_common.times_root_transposed(rooted.reshape(-1, rooted.shape[2]))
+    collar, path = _of_path(found, common, halves, wholes)
     of_path = [ErrorShare(ShareSource.COLLAR, -1, collar), ErrorShare(ShareSource.PATH, -1, path)]
     shares = [*shares_of_string(found, common.T, causes), *of_path]
     return [ErrorShare(one.source, one.subject, one.variances.reshape(-1, 3)) for one in shares]
@@ -57,41 +53,43 @@ def _summed(found: Adjusted, by_state: Array, halves: Array, wholes: Array) -> A
     return np.asarray(passed + (halves - wholes)[:, None, None] * turned)
 
 
-def _of_path(found: Adjusted, by_common: Array, common: Array, halves: Array, wholes: Array) -> tuple[Array, Array]:
+def _of_path(found: Adjusted, common: Array, halves: Array, wholes: Array) -> tuple[Array, Array]:
     """Shares (3 s + 3,) of the direction at the collar and of the curvature that wanders.
 
-    A position has the states x = a + B f, with B the change of states with what is in common and f (3 s + 3, p) what
-    it has in common; with the information P of the path alone x^T P x = a^T P a + 2 f^T B^T P a + f^T B^T P B f.
+    A position w has the states x = a + B f, with S a = w, B the change of states with what is in common and f
+    (3 s + 3, p) what it has in common. Of the chain S = P + N, P is what is known of path and collar and N what looks
+    tell: x^T P x = a^T P a + 2 f^T (B - S^-1 N B)^T w + f^T (B^T S B - B^T N B) f. B^T S B is what the path, taken out,
+    took of the information in common.
     """
     solution, count = found.solution, len(found.path.md)
     own = np.empty((count, 2, 3))
     position_sums(solution.diagonal, solution.tied, solution.at_station, found.bases, halves, wholes, own)
-    both, squares = _path_weighed(found)
-    _solve_chain(found, both)
-    crossed = _summed(found, both, halves, wholes).reshape(by_common.shape)  # a^T P B, for S a is the position
-    whole = own[:, 1].reshape(-1) + np.sum(common * (2.0 * crossed + times_lower(common, as_triangle(squares))), axis=1)
+    crossed = found.by_common.copy()
+    seen, squares = _seen_by_looks(found)
+    _solve_chain(found, seen)
+    crossed -= seen
+    summed = _summed(found, crossed, halves, wholes).reshape(common.shape)
+    triangle = as_triangle(solution.whole - solution.in_common.information - squares)
+    whole = own[:, 1].reshape(-1) + np.sum(common * (2.0 * summed + times_lower(common, triangle)), axis=1)
     collar = _of_collar(found, common, halves, wholes)
     return collar, whole - collar
 
 
-def _path_weighed(found: Adjusted) -> tuple[Array, Array]:
-    """P B (s + 1, 4, p) and B^T P B (p, p), of the information P of the path alone.
+def _seen_by_looks(found: Adjusted) -> tuple[Array, Array]:
+    """N B (s + 1, 4, p) and B^T N B (p, p), of the information N of the looks on directions.
 
-    B is the change of the states with what is in common, and P the sum of the squares of what the collar and each leg
-    depart by: as squares it takes half of the work of a product.
+    As squares of a root of N the latter takes half of the work of a product.
     """
-    by_common, now = found.by_common, found.now
-    weighed, departs = np.zeros((2, *by_common.shape))
-    root = np.linalg.cholesky(known_collar(found.path, found.bases))
-    departs[0, :2] = root.T @ by_common[0, :2]
-    departs[0, 2:] = by_common[0, 2:] / math.sqrt(now.curvature_var)
-    weighed[0, :2], weighed[0, 2:] = root @ departs[0, :2], by_common[0, 2:] / now.curvature_var
-    if len(by_common) > 1:
-        go, rigid = leg_steps(found.path)
-        roots = np.asarray(np.linalg.cholesky(rigid / now.leg_vars[:, None, None]))
-        weigh_legs(go, roots, by_common, departs, weighed)
-    flat = departs.reshape(-1, by_common.shape[2])
-    return weighed, flat.T @ flat
+    by_direction, at_station = found.by_common[:, :2], found.solution.at_station
+    root = np.zeros_like(at_station)  # lower; of a place without looks it is zero
+    root[:, 0, 0] = np.sqrt(at_station[:, 0, 0])
+    root[:, 1, 0] = at_station[:, 1, 0] / np.where(root[:, 0, 0] > 0.0, root[:, 0, 0], 1.0)
+    root[:, 1, 1] = np.sqrt(np.maximum(at_station[:, 1, 1] - root[:, 1, 0] ** 2, 0.0))
+    rooted = np.swapaxes(root, 1, 2) @ by_direction
+    seen = np.zeros_like(found.by_common)
+    seen[:, :2] = root @ rooted
+    flat = rooted.reshape(-1, rooted.shape[2])
+    return seen, flat.T @ flat
 
 
 def as_triangle(symmetric: Array) -> Array:

@@ -11,6 +11,7 @@ from groundstation.survey.adjustment.kernels.observations import (
     add_right_sides,
     linearise_looks,
     mirror_upper,
+    take_step,
     weigh_down,
 )
 from groundstation.survey.adjustment.kernels.path_elimination import (
@@ -20,7 +21,7 @@ from groundstation.survey.adjustment.kernels.path_elimination import (
     reduce_right,
     substitute_path,
 )
-from groundstation.survey.adjustment.kernels.path_legs import add_legs, leg_departures, leg_squares, weigh_legs
+from groundstation.survey.adjustment.kernels.path_legs import add_legs, bend_to, leg_departures, leg_squares
 from groundstation.survey.adjustment.kernels.position_sums import position_sums
 
 
@@ -47,6 +48,9 @@ def warm_adjustment() -> None:
     add_right_sides(
         first, first, first, jacobians, weights, residuals, extra, 6, np.zeros((1, 4)), np.zeros(width),
     )  # fmt: skip
+    take_step(
+        first, first, first, jacobians, residuals, extra, 6, np.zeros((1, 4)), np.zeros(width), np.zeros((1, 3)),
+    )  # fmt: skip
     mirror_upper(common, width)
     diagonal, tied, coupled = np.eye(4)[None].copy(), np.zeros((1, 4, 4)), np.zeros((1, 4, width + 1))
     eliminate_path(diagonal, tied, coupled)
@@ -55,8 +59,8 @@ def warm_adjustment() -> None:
     substitute_path(diagonal, tied, coupled)
     path_covariances(diagonal, tied, np.zeros((1, 4, 4)))
     legs, place = (diagonal[:0], diagonal[:0]), (tangents, bases, np.zeros((1, 2)))
+    bend_to(tangents[0], tangents[0], bases[0], np.zeros(2))
     add_legs(*legs, one[:0], *place, diagonal, tied, np.zeros((1, 4)))
-    weigh_legs(*legs, coupled, coupled.copy(), coupled.copy())
     leg_departures(legs[0], *place, np.zeros((0, 4)))
     leg_squares(*legs, *place, diagonal, tied, diagonal.copy(), coupled, one[:0].copy(), one[:0].copy())
     position_sums(

@@ -222,3 +222,28 @@ def add_right_sides(
             of_common[size - count + a] += (
                 extra[k, 0, a] * pulled[0] + extra[k, 1, a] * pulled[1] + extra[k, 2, a] * pulled[2]
             )
+
+
+@kernel
+def take_step(
+    station: Places, tube: Places, make_up: Places, jacobians: Array, residuals: Array, extra: Array, gravity_at: int,
+    states: Array, common: Array, left: Array,
+) -> None:  # fmt: skip
+    """Set what looks leave (n, 3) once the unknowns have gone a step.
+
+    Parameters
+    ----------
+    station, tube, make_up, jacobians, residuals, extra, gravity_at : of the looks, see ``add_looks``
+    states, common : (s + 1, 2 or more) and (p,), the step of directions, and of what stations have in common
+    """
+    count, size = extra.shape[2], len(common)
+    for k in range(len(station)):
+        of_direction, first, turn = states[station[k]], 6 * tube[k], common[gravity_at + 1 + make_up[k]]
+        for i in range(3):
+            j = jacobians[k, i]
+            moved = j[0] * of_direction[0] + j[1] * of_direction[1] + j[7] * turn + j[8] * common[gravity_at]
+            for a in range(6):
+                moved += j[2 + a] * common[first + a]
+            for a in range(count):
+                moved += extra[k, i, a] * common[size - count + a]
+            left[k, i] = residuals[k, i] - moved

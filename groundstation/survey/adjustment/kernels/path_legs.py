@@ -11,15 +11,24 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.adjustment.kernels.path_elimination import (
-    divide_by_transposed,
-    take_image,
-    take_product,
-)
+from groundstation.survey.adjustment.kernels.path_elimination import divide_by_transposed
 from node.kernels.arithmetic.jit import allocating_kernel, kernel
 
 Array = npt.NDArray[np.float64]
 TINY = 1e-12
+
+
+@kernel
+def bend_to(before: Array, after: Array, basis: Array, out: Array) -> None:
+    """Set the bend (2), rad, from one direction (3,) to another along the great circle, in a basis (2, 3)."""
+    for a in range(2):
+        v = basis[a]
+        out[a] = v[0] * after[0] + v[1] * after[1] + v[2] * after[2]
+    size = math.sqrt(out[0] * out[0] + out[1] * out[1])
+    angle = math.atan2(size, before[0] * after[0] + before[1] * after[1] + before[2] * after[2])
+    scale = angle / size if size > TINY else 1.0
+    for a in range(2):
+        out[a] *= scale
 
 
 @kernel
@@ -32,15 +41,8 @@ def leg_departure(k: int, go: Array, tangents: Array, bases: Array, curvatures: 
     go : (s, 4, 4), how a state goes on over each leg
     tangents, bases, curvatures : (s + 1, 3), (s + 1, 2, 3) and (s + 1, 2) of collar and stations
     """
-    before, after = tangents[k], tangents[k + 1]
+    bend_to(tangents[k], tangents[k + 1], bases[k], out)
     for a in range(2):
-        v = bases[k, a]
-        out[a] = v[0] * after[0] + v[1] * after[1] + v[2] * after[2]
-    size = math.sqrt(out[0] * out[0] + out[1] * out[1])
-    angle = math.atan2(size, before[0] * after[0] + before[1] * after[1] + before[2] * after[2])
-    scale = angle / size if size > TINY else 1.0
-    for a in range(2):
-        out[a] *= scale  # the bend along the great circle
         out[2 + a] = curvatures[k + 1, a]
     for a in range(4):
         out[a] -= go[k, a, 2] * curvatures[k, 0] + go[k, a, 3] * curvatures[k, 1]
@@ -149,29 +151,3 @@ def departed_squares(go: Array, rigid: Array, upper: Array, lower: Array, off: A
             for b in range(4):
                 total += off[a] * rigid[a, b] * off[b]
     return total
-
-
-@allocating_kernel
-def weigh_legs(go: Array, roots: Array, states: Array, departs: Array, weighed: Array) -> None:
-    """What changes of the states make every leg depart by, in its standard deviations, and the pull of that.
-
-    Parameters
-    ----------
-    go : (s, 4, 4), how a state goes on over each leg
-    roots : (s, 4, 4), lower Cholesky factors R of the information of each
-    states : (s + 1, 4, r)
-    departs : (s + 1, 4, r), zeros but for the first row; set to R^T of what each leg departs by
-    weighed : (s + 1, 4, r), added to: information of the legs times the states
-    """
-    off, pull, minus = np.empty(states.shape[1:]), np.empty(states.shape[1:]), np.empty((4, 4))
-    for k in range(len(go)):
-        for a in range(4):
-            for b in range(4):
-                minus[a, b] = -roots[k, a, b]
-        off[:] = states[k + 1]
-        take_image(go[k], states[k], off)
-        take_product(minus, off, departs[k + 1])
-        pull[:] = 0.0
-        take_image(minus, departs[k + 1], pull)
-        weighed[k + 1] += pull
-        take_product(go[k], pull, weighed[k])
