@@ -1,4 +1,5 @@
 /* Frames of a joint's link: the few forms of msgpack that they have, see hop_link.h. */
+#include "big_endian.h"
 #include "crc32.h"
 #include "hop_link.h"
 
@@ -9,20 +10,9 @@
 #define CHECKSUM 4u
 #define NUMBERS UINT64_C(9007199254740992) /* an entry's number is below 2^53 */
 
-/* Big-endian bytes from the front; false where too few are left. */
 static bool take_bytes(struct link_entries *from, uint32_t bytes, uint64_t *value)
 {
-    uint32_t k;
-    if (from->left < bytes) {
-        return false;
-    }
-    *value = 0u;
-    for (k = 0u; k < bytes; k++) {
-        *value = *value << 8 | from->at[k];
-    }
-    from->at += bytes;
-    from->left -= bytes;
-    return true;
+    return take_big_endian(&from->at, &from->left, bytes, value);
 }
 
 /* A whole number that is not negative, in whatever of its forms. */

@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "big_endian.h"
+
 #define MOST_NESTED 16u
 #define HELD (INT64_C(1) << 62)
 
@@ -110,17 +112,7 @@ uint32_t packed_length(const struct pack_writer *to)
 
 static bool take(struct pack_reader *from, uint32_t bytes, uint64_t *value)
 {
-    uint32_t k;
-    if (from->left < bytes) {
-        return false;
-    }
-    *value = 0u;
-    for (k = 0u; k < bytes; k++) {
-        *value = *value << 8 | from->at[k];
-    }
-    from->at += bytes;
-    from->left -= bytes;
-    return true;
+    return take_big_endian(&from->at, &from->left, bytes, value);
 }
 
 bool read_map(struct pack_reader *from, uint32_t *count)
