@@ -1,4 +1,4 @@
-"""The stepper's end of a bus, on a bus in memory: who is there, what goes where, and what is nobody's."""
+"""The stepper's end of a bus, on a bus in memory: who is there, what goes where, and what belongs to no process."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_who_has_a_token_is_there_in_the_order_of_addresses_until_it_goes() -> N
     assert not rig.stepper.wait_for(4, alive=True, timeout=0.0)
     rig.token("12", alive=False)
     assert rig.stepper.wait_for(12, alive=False, timeout=0.0)
-    rig.token("nobody", alive=True)
+    rig.token("stranger", alive=True)
     rig.token("300", alive=True)
     assert not rig.stepper.wait_for(4, alive=True, timeout=0.01)
     assert rig.stepper.alive() == [ENCODER, 3, BASE]
@@ -230,7 +230,7 @@ def test_a_cue_is_answered_once_under_its_whole_name(acted: Acted) -> None:
     rig = Rig()
     assert rig.stepper.wait_for_cue("add 3", 0.0) is Acted.NO_ANSWER
     rig.bus.tell(keys.CUE, f"{acted.value} add 3".encode())
-    if acted is Acted.NO_ANSWER:  # "no answer" is two words: nobody says it on the bus
+    if acted is Acted.NO_ANSWER:  # "no answer" is two words, which no process says on the bus
         assert rig.stepper.wait_for_cue("add 3", 0.0) is Acted.NO_ANSWER
         assert rig.stepper.foreign == 1
         return

@@ -157,7 +157,7 @@ def test_a_frame_that_the_controller_refuses_is_counted_and_the_next_goes(error:
 
 
 def test_what_is_on_the_bus_is_told_by_its_kind() -> None:
-    """Frames of others as lines, own ones as acknowledged, errors counted; frames of the base format are nobody's."""
+    """Frames of others as lines, own ones as acknowledged, errors counted; frames of the base format are left alone."""
     line = Line(OPENING)
     controller = Controller()
     bridge = ChipBridge(line, controller, fd=False, tell=lambda _: None)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""What is said where nobody says anything: every field of every message with what it is when it is left out, limits of
+"""What is said where nothing is: every field of every message with what it is when it is left out, limits of
 signals, and which extra brings a module that is missing."""
 
 from __future__ import annotations
