@@ -42,6 +42,7 @@ REQUIRED: Final = [
     "17.7",
     "20.7",
     "21.14",
+    "21.16",
 ]  # of those found
 ABOUT: Final = {
     "2.2": "what has no effect",
@@ -74,6 +75,7 @@ ABOUT: Final = {
     "19.2": "unions",
     "20.7": "arguments of macros without parentheses",
     "21.14": "memcmp of texts",
+    "21.16": "memcmp of records, which have no byte between their numbers",
 }
 
 

@@ -75,6 +75,16 @@ void pack_text(struct pack_writer *to, const char *text)
     }
 }
 
+void pack_binary(struct pack_writer *to, const uint8_t *bytes, uint32_t length)
+{
+    uint32_t k;
+    put(to, 0xC4u, 1u);
+    put(to, length, 1u);
+    for (k = 0u; k < length; k++) {
+        put(to, bytes[k], 1u);
+    }
+}
+
 void pack_bool(struct pack_writer *to, bool value)
 {
     put(to, value ? 0xC3u : 0xC2u, 1u);
@@ -191,7 +201,7 @@ bool read_binary(struct pack_reader *from, const uint8_t **bytes, uint32_t *leng
     return read_run(from, false, bytes, length);
 }
 
-static int64_t scaled(uint64_t bits, int32_t q)
+int64_t quantity_of_bits(uint64_t bits, int32_t q)
 {
     const int32_t exponent = (int32_t)(bits >> 52 & 0x7FFu);
     const uint64_t mantissa = (bits & ((UINT64_C(1) << 52) - 1u)) | (exponent == 0 ? 0u : UINT64_C(1) << 52);
@@ -218,7 +228,7 @@ bool read_quantity(struct pack_reader *from, int32_t q, int64_t *value)
         if ((bits >> 52 & 0x7FFu) == 0x7FFu) {
             return false;
         }
-        *value = scaled(bits, q);
+        *value = quantity_of_bits(bits, q);
         *from = ahead;
         return true;
     }

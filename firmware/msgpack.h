@@ -24,6 +24,7 @@ void pack_map(struct pack_writer *to, uint32_t count);   /* up to 15 */
 void pack_array(struct pack_writer *to, uint32_t count); /* likewise */
 void pack_integer(struct pack_writer *to, int64_t value);
 void pack_text(struct pack_writer *to, const char *text); /* up to 255 bytes */
+void pack_binary(struct pack_writer *to, const uint8_t *bytes, uint32_t length); /* likewise */
 void pack_bool(struct pack_writer *to, bool value);
 /* A float64 of `value` in Qq: the nearest, ties to even. */
 void pack_float(struct pack_writer *to, int64_t value, int32_t q);
@@ -34,6 +35,8 @@ bool read_map(struct pack_reader *from, uint32_t *count);
 bool read_integer(struct pack_reader *from, int64_t *value);
 bool read_text(struct pack_reader *from, const uint8_t **text, uint32_t *length);
 bool read_binary(struct pack_reader *from, const uint8_t **bytes, uint32_t *length);
+/* The bits of a finite float64 in Qq, to the nearest, held at the ends of 62 bits. */
+int64_t quantity_of_bits(uint64_t bits, int32_t q);
 /* A float64 or a whole number in Qq, held at the ends of 62 bits. */
 bool read_quantity(struct pack_reader *from, int32_t q, int64_t *value);
 /* Passes over one value, whatever it is. */

@@ -23,6 +23,12 @@ SENSOR = struct.Struct(f"<{(POWERS + 1) * 12 + 1}d")
 MAGIC = b"BCPB"
 BLOCK_SIZE = HEAD.size + 2 * SENSOR.size
 MAX_VERSION = 2**32 - 1
+# what a node holds a block to
+MAX_CONDITION = 4.0
+MAX_DISTANCE = 0.2  # of any entry of M from that of the identity or of the block before
+MAX_DRIFT = 0.1  # of any entry of M from its value at the reference, over the range of temperature
+MAX_BIAS = {"gyroscope": math.radians(20.0), "accelerometer": 2.0}  # rad/s, m/s^2
+MAX_FORCE_ERROR = 0.05  # of gravity, at rest
 
 ZERO: Vector3 = (0.0, 0.0, 0.0)
 NO_MATRIX: Matrix3 = (ZERO, ZERO, ZERO)

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "borechain_orders.h"
+#include "chip_signals.h"
 #include "chip_words.h"
 #include "msgpack.h"
 #include "node_memory.h"
@@ -13,11 +14,9 @@
 #define SAY_SURVEY 2
 #define SAY_STATE 8
 #define SAY_REVISION 64
-#define ONWARD 2
 #define NO_NUMBER (INT64_C(1) << 60)
 #define UNKNOWN_VAR_US2 INT64_C(12960000000000) /* (3.6 s)^2 */
 #define DATED_VAR_US2 INT64_C(2500000000)       /* (0.05 s)^2 */
-#define HELLO_EVERY_MS 1000u
 #define QUICK_MS 1000u
 #define SLOW_MS 10000u
 #define BURST 30u
@@ -27,18 +26,16 @@
 #define ENCODER 0u
 #define BASE 251
 #define STATIC_BIAS 1
-#define WHOLE_QUALITY 100u
-#define MOST_HOPS 250
 #define STATE 5 /* kinds of payloads: those below are for one hop */
 #define BLOCK_SEGMENT 11
 #define SESSION_OFFER 15
 
-static uint32_t ms_of(int64_t us)
+uint32_t node_ms(int64_t us)
 {
     return (uint32_t)((uint64_t)us / 1000u);
 }
 
-static int64_t clock_var(const struct chip_node *node)
+int64_t node_clock_var(const struct chip_node *node)
 {
     const int64_t var = clock_variance(&node->clock, node->now_us);
     return var < UNKNOWN_VAR_US2 ? var : UNKNOWN_VAR_US2;
@@ -46,179 +43,17 @@ static int64_t clock_var(const struct chip_node *node)
 
 static bool is_dated(const struct chip_node *node)
 {
-    return node->clock.exchanges > 0u && clock_var(node) < DATED_VAR_US2;
-}
-
-static uint8_t count_of(const struct chip_end *end)
-{
-    return (uint8_t)end->link.frames;
-}
-
-/* Signals */
-
-static void say_state(struct chip_node *node)
-{
-    struct borechain_native_node_state state;
-    uint8_t data[BORECHAIN_NATIVE_NODE_STATE_LENGTH];
-    struct chip_end *const end = &node->ends[NODE_UPPER];
-    state_of_node(node, node->cycle_us, &state);
-    if (borechain_native_pack_node_state(&state, count_of(end), data) == BORECHAIN_NATIVE_TAKEN) {
-        chip_end_say(end, BORECHAIN_NATIVE_NODE_STATE_IDENTIFIER, state.tube, data, sizeof data);
-    }
-}
-
-static void pass_state(struct chip_node *node, const struct borechain_native_node_state *state)
-{
-    uint8_t data[BORECHAIN_NATIVE_NODE_STATE_LENGTH];
-    struct chip_end *const end = &node->ends[NODE_UPPER];
-    if (borechain_native_pack_node_state(state, count_of(end), data) == BORECHAIN_NATIVE_TAKEN) {
-        chip_end_say(end, BORECHAIN_NATIVE_NODE_STATE_IDENTIFIER, state->tube, data, sizeof data);
-    }
-}
-
-static void say_hello(struct chip_node *node)
-{
-    struct borechain_native_hello hello;
-    uint8_t data[BORECHAIN_NATIVE_HELLO_LENGTH];
-    uint32_t side;
-    hello.tube = node->identity.tube;
-    hello.boot_count = node->kept.boots;
-    hello.hops = (int16_t)node->kept.hops;
-    hello.mode = (uint8_t)node->record.filter.mode;
-    hello.link_quality = WHOLE_QUALITY;
-    for (side = 0u; side < 2u; side++) {
-        if (borechain_native_pack_hello(&hello, count_of(&node->ends[side]), data) == BORECHAIN_NATIVE_TAKEN) {
-            chip_end_say(&node->ends[side], BORECHAIN_NATIVE_HELLO_IDENTIFIER, 0u, data, sizeof data);
-        }
-    }
-}
-
-static void ask_time(struct chip_node *node)
-{
-    struct borechain_native_time_request request;
-    uint8_t data[BORECHAIN_NATIVE_TIME_REQUEST_LENGTH];
-    struct chip_end *const end = &node->ends[NODE_UPPER];
-    request.asked_at = node->now_us / 10;
-    if (borechain_native_pack_time_request(&request, count_of(end), data) == BORECHAIN_NATIVE_TAKEN) {
-        chip_end_say(end, BORECHAIN_NATIVE_TIME_REQUEST_IDENTIFIER, 0u, data, sizeof data);
-    }
-}
-
-static void tell_time(struct chip_node *node, const struct borechain_native_time_request *request)
-{
-    struct borechain_native_time_reply reply;
-    uint8_t data[BORECHAIN_NATIVE_TIME_REPLY_LENGTH];
-    struct chip_end *const end = &node->ends[NODE_LOWER];
-    struct borechain_native_node_state own;
-    if (node->clock.exchanges == 0u) {
-        return;
-    }
-    state_of_node(node, node->now_us, &own); /* its clock_var is in the levels of a reply */
-    reply.asked_at = request->asked_at;
-    reply.received_at = reply.replied_at = node->now_us / 10;
-    reply.rig_at = clock_rig_from_local(&node->clock, node->now_us) / 10;
-    reply.rig_rate = (uint32_t)clock_rig_rate(&node->clock);
-    reply.clock_var = own.clock_var;
-    reply.epoch = node->clock.told.epoch;
-    if (borechain_native_pack_time_reply(&reply, count_of(end), data) == BORECHAIN_NATIVE_TAKEN) {
-        chip_end_say(end, BORECHAIN_NATIVE_TIME_REPLY_IDENTIFIER, 0u, data, sizeof data);
-    }
-}
-
-static void hear_time(struct chip_node *node, const struct borechain_native_time_reply *heard)
-{
-    struct clock_reply reply;
-    reply.asked_us = heard->asked_at * 10;
-    reply.received_us = heard->received_at * 10;
-    reply.replied_us = heard->replied_at * 10;
-    reply.rig_us = heard->rig_at * 10;
-    reply.rig_var = us2_of_level(heard->clock_var);
-    reply.rig_rate = heard->rig_rate;
-    reply.epoch = heard->epoch;
-    clock_exchange(&node->clock, &reply, node->now_us);
-}
-
-static void hear_hello(struct chip_node *node, enum node_side side, const struct borechain_native_hello *hello)
-{
-    if (!node->has_neighbour[side] || node->neighbours[side] != hello->tube) {
-        node->hello_at_ms = ms_of(node->now_us) - HELLO_EVERY_MS; /* a newcomer learns at once who is here */
-        if (side == NODE_UPPER && node->has_neighbour[side]) {
-            clock_doubt(&node->clock);
-        }
-    }
-    node->has_neighbour[side] = true;
-    node->neighbours[side] = hello->tube;
-    if (side == NODE_UPPER && hello->hops >= 0 && hello->hops < MOST_HOPS) {
-        node->save_is_due = node->save_is_due || node->kept.hops != hello->hops + 1;
-        node->kept.hops = hello->hops + 1;
-        node->is_told_hops = true;
-    }
-}
-
-static void hear_aiding(struct chip_node *node, const struct borechain_native_aiding *heard)
-{
-    struct borechain_native_aiding onward;
-    uint8_t data[BORECHAIN_NATIVE_AIDING_LENGTH];
-    int64_t aiding[12], valid_us;
-    struct chip_end *const end = &node->ends[NODE_LOWER];
-    if (node->clock.exchanges == 0u) {
-        return;
-    }
-    if (heard->epoch != node->clock.told.epoch && heard->epoch != 0u && node->clock.told.epoch != 0u) {
-        node->ask_at_ms = ms_of(node->now_us);
-        return;
-    }
-    valid_us = clock_local_from_rig(&node->clock, heard->valid_at * 10);
-    if (node->clock.stepped_us != CLOCK_UNKNOWN) {
-        valid_us -= node->clock.stepped_us; /* the cycle learns of the step, and moves what waits for it */
-    }
-    aiding_for_step(heard, valid_us, clock_var(node), aiding);
-    if ((borechain_aiding(&node->record, &node->settings, aiding) & ONWARD) == 0) {
-        return;
-    }
-    aiding_for_below(heard, &node->record, &onward);
-    if (borechain_native_pack_aiding(&onward, count_of(end), data) == BORECHAIN_NATIVE_TAKEN) {
-        chip_end_say(end, BORECHAIN_NATIVE_AIDING_IDENTIFIER, 0u, data, sizeof data);
-    }
-}
-
-static void on_signals(struct chip_node *node, enum node_side side, int type, const union native_message *heard)
-{
-    switch (type) {
-    case BORECHAIN_NATIVE_AIDING_TYPE:
-        if (side == NODE_UPPER) {
-            hear_aiding(node, &heard->aiding);
-        }
-        break;
-    case BORECHAIN_NATIVE_HELLO_TYPE:
-        hear_hello(node, side, &heard->hello);
-        break;
-    case BORECHAIN_NATIVE_TIME_REQUEST_TYPE:
-        if (side == NODE_LOWER) {
-            tell_time(node, &heard->time_request);
-        }
-        break;
-    case BORECHAIN_NATIVE_TIME_REPLY_TYPE:
-        if (side == NODE_UPPER) {
-            hear_time(node, &heard->time_reply);
-        }
-        break;
-    default:
-        if (side == NODE_LOWER) {
-            pass_state(node, &heard->node_state);
-        }
-        break;
-    }
+    return node->clock.exchanges > 0u && node_clock_var(node) < DATED_VAR_US2;
 }
 
 static void on_upper_signals(void *own, int type, const union native_message *heard)
 {
-    on_signals(own, NODE_UPPER, type, heard);
+    signals_hear(own, NODE_UPPER, type, heard);
 }
 
 static void on_lower_signals(void *own, int type, const union native_message *heard)
 {
-    on_signals(own, NODE_LOWER, type, heard);
+    signals_hear(own, NODE_LOWER, type, heard);
 }
 
 /* Payloads */
@@ -310,7 +145,7 @@ static void on_command(struct chip_node *node, const struct word_order *order)
         answer->order = order->number;
         answer->length = (uint8_t)word_reply(
             node->identity.tube, order->number, is_done, detail, answer->room, NODE_REPLY_ROOM);
-        memory_save(node, ms_of(node->now_us));
+        memory_save(node, node_ms(node->now_us));
     }
     (void)link_send(&node->ends[NODE_UPPER].link, answer->room, answer->length);
 }
@@ -336,6 +171,10 @@ static void on_upper_payload(void *own, const uint8_t *payload, uint32_t length)
         (void)pass_on(node, NODE_LOWER, payload, length);
         return;
     }
+    if (kind == BLOCK_SEGMENT) {
+        block_on_segment(node, payload, length);
+        return;
+    }
     if (!word_read(payload, length, &order)) {
         return;
     }
@@ -358,7 +197,7 @@ static void on_lower_payload(void *own, const uint8_t *payload, uint32_t length)
 
 /* What the step says */
 
-static struct word_origin origin_of(const struct chip_node *node, int64_t number)
+struct word_origin node_origin(const struct chip_node *node, int64_t number)
 {
     struct word_origin origin;
     origin.number = number;
@@ -368,9 +207,14 @@ static struct word_origin origin_of(const struct chip_node *node, int64_t number
     return origin;
 }
 
-static void keep(struct chip_node *node, struct mail_item *item, uint32_t length)
+struct mail_item *node_mail_place(struct chip_node *node, bool is_needed)
 {
-    mail_keep(item, length, ms_of(node->now_us));
+    return mail_place(&node->kept.mail, &node->ends[NODE_UPPER].link, is_needed);
+}
+
+void node_keep(struct chip_node *node, struct mail_item *item, uint32_t length)
+{
+    mail_keep(item, length, node_ms(node->now_us));
     node->save_is_due = true;
 }
 
@@ -378,11 +222,10 @@ static void tell_events(struct chip_node *node)
 {
     int64_t numbers[WORDS_EVENT_NUMBERS], code;
     while ((code = borechain_next_event(&node->record, numbers)) != 0) {
-        struct mail_item *const item =
-            mail_place(&node->kept.mail, &node->ends[NODE_UPPER].link, word_event_is_error(code));
+        struct mail_item *const item = node_mail_place(node, word_event_is_error(code));
         if (item != NULL) {
-            const struct word_origin origin = origin_of(node, item->number);
-            keep(node, item, word_event(&origin, code, numbers, item->payload, MAIL_ROOM));
+            const struct word_origin origin = node_origin(node, item->number);
+            node_keep(node, item, word_event(&origin, code, numbers, item->payload, MAIL_ROOM));
         }
     }
 }
@@ -390,13 +233,13 @@ static void tell_events(struct chip_node *node)
 static void tell_survey(struct chip_node *node, bool is_revised)
 {
     const struct borechain_state *const filter = &node->record.filter;
-    struct mail_item *const item = mail_place(&node->kept.mail, &node->ends[NODE_UPPER].link, true);
+    struct mail_item *const item = node_mail_place(node, true);
     struct word_survey survey;
     struct word_origin origin;
     if (item == NULL) {
         return;
     }
-    origin = origin_of(node, item->number);
+    origin = node_origin(node, item->number);
     survey.flags = node_flags(node, q28_of_us(node->cycle_us), is_dated(node));
     if (!is_revised) {
         node->surveyed.is_said = true;
@@ -414,17 +257,33 @@ static void tell_survey(struct chip_node *node, bool is_revised)
     survey.yaw_var = node_yaw_var(is_revised ? filter->surveyed_var : filter->now_P[2][2]);
     survey.systematic_var =
         (is_revised ? node->record.revision.systematic : filter->systematic_var) + node->identity.mount_var;
-    keep(node, item, word_survey(&origin, &survey, filter, item->payload, MAIL_ROOM));
+    node_keep(node, item, word_survey(&origin, &survey, filter, item->payload, MAIL_ROOM));
 }
 
 static void announce(struct chip_node *node)
 {
     struct mail_item *item;
     node->is_announced = true;
-    item = mail_place(&node->kept.mail, &node->ends[NODE_UPPER].link, false);
+    item = node_mail_place(node, false);
     if (item != NULL) {
-        const struct word_origin origin = origin_of(node, item->number);
-        keep(node, item, word_start(&origin, node->record.filter.now_yaw, node->worth, item->payload, MAIL_ROOM));
+        const struct word_origin origin = node_origin(node, item->number);
+        node_keep(node, item, word_start(&origin, node->record.filter.now_yaw, node->worth, item->payload, MAIL_ROOM));
+    }
+}
+
+static void say(struct chip_node *node, int64_t says)
+{
+    if ((says & SAY_EVENTS) != 0) {
+        tell_events(node);
+    }
+    if ((says & SAY_SURVEY) != 0) {
+        tell_survey(node, false);
+    }
+    if ((says & SAY_REVISION) != 0 && node->surveyed.is_said) {
+        tell_survey(node, true);
+    }
+    if ((says & SAY_STATE) != 0 && node->clock.exchanges > 0u) {
+        signals_say_state(node);
     }
 }
 
@@ -444,27 +303,16 @@ void node_on_readings(struct chip_node *node, int64_t readings[BORECHAIN_IMUS][N
     moment[1] = q28_of_us(now_us);
     moment[2] = node->has_neighbour[NODE_UPPER] ? 1 : 0;
     moment[3] = node->kept.hops;
-    moment[4] = node_var_q56(clock_var(node));
+    moment[4] = node_var_q56(node_clock_var(node));
     moment[5] = is_dated(node) ? 1 : 0;
     moment[6] = stepped == CLOCK_UNKNOWN ? NO_NUMBER : q28_of_us(stepped);
     moment[7] = node->clock.exchanges > 0u ? clock_drift_std(&node->clock) * 70369 : 0; /* 1e-9 in Q46 */
-    says = borechain_step(&node->record, &node->settings, node->parameters, readings, moment);
-    if (says <= 0) {
-        return;
+    says = borechain_step(&node->record, &node->settings, node->kept.corrections, readings, moment);
+    if (says > 0) {
+        say(node, says);
+        node->save_is_due = node->save_is_due || (was_still && node->record.filter.still_cycles == 0);
     }
-    if ((says & SAY_EVENTS) != 0) {
-        tell_events(node);
-    }
-    if ((says & SAY_SURVEY) != 0) {
-        tell_survey(node, false);
-    }
-    if ((says & SAY_REVISION) != 0 && node->surveyed.is_said) {
-        tell_survey(node, true);
-    }
-    if ((says & SAY_STATE) != 0 && node->clock.exchanges > 0u) {
-        say_state(node);
-    }
-    node->save_is_due = node->save_is_due || (was_still && node->record.filter.still_cycles == 0);
+    block_on_cycle(node);
 }
 
 /* Driven from outside */
@@ -488,13 +336,13 @@ bool node_begin(
         return false;
     }
     node->kept.boots++;
-    chip_end_begin(&node->ends[NODE_UPPER], &upper, identity->tube, node->kept.boots, ISOTP_FD, nonce, ms_of(now_us));
+    chip_end_begin(&node->ends[NODE_UPPER], &upper, identity->tube, node->kept.boots, ISOTP_FD, nonce, node_ms(now_us));
     chip_end_begin(
-        &node->ends[NODE_LOWER], &lower, identity->tube, node->kept.boots, ISOTP_FD, nonce + 1u, ms_of(now_us));
-    mail_resume(&node->kept.mail, ms_of(now_us));
-    node->hello_at_ms = ms_of(now_us) - HELLO_EVERY_MS;
-    node->ask_at_ms = ms_of(now_us);
-    memory_save(node, ms_of(now_us));
+        &node->ends[NODE_LOWER], &lower, identity->tube, node->kept.boots, ISOTP_FD, nonce + 1u, node_ms(now_us));
+    mail_resume(&node->kept.mail, node_ms(now_us));
+    node->hello_at_ms = node_ms(now_us) - HELLO_EVERY_MS;
+    node->ask_at_ms = node_ms(now_us);
+    memory_save(node, node_ms(now_us));
     return true;
 }
 
@@ -507,7 +355,7 @@ void node_on_frame(
     int64_t now_us)
 {
     node->now_us = now_us;
-    chip_end_on_frame(&node->ends[side], identifier, data, length, ms_of(now_us));
+    chip_end_on_frame(&node->ends[side], identifier, data, length, node_ms(now_us));
 }
 
 static void follow_links(struct chip_node *node, uint32_t now_ms)
@@ -522,20 +370,21 @@ static void follow_links(struct chip_node *node, uint32_t now_ms)
 
 void node_advance(struct chip_node *node, int64_t now_us)
 {
-    const uint32_t now_ms = ms_of(now_us);
+    const uint32_t now_ms = node_ms(now_us);
     const uint32_t every = node->refused != 0u ? RETRY_EVERY_MS : SAVE_EVERY_MS;
     node->now_us = now_us;
     follow_links(node, now_ms);
     if (now_ms - node->hello_at_ms >= HELLO_EVERY_MS) {
         node->hello_at_ms = now_ms;
-        say_hello(node);
+        signals_say_hello(node);
     }
     if ((int32_t)(now_ms - node->ask_at_ms) >= 0 && link_is_up(&node->ends[NODE_UPPER].link, now_ms)) {
         node->ask_at_ms = now_ms + (node->clock.exchanges < BURST ? QUICK_MS : SLOW_MS);
-        ask_time(node);
+        signals_ask_time(node);
     }
     if ((node->save_is_due && node->refused == 0u) || now_ms - node->saved_at_ms >= every) {
         memory_save(node, now_ms);
     }
     mail_send(&node->kept.mail, &node->ends[NODE_UPPER].link, now_ms); /* behind the save; a worn flash ends nothing */
+    block_advance(node);
 }

@@ -8,9 +8,11 @@
 #define BORECHAIN_CHIP_NODE_H
 
 #include "borechain_step.h"
+#include "chip_block.h"
 #include "chip_clock.h"
 #include "chip_end.h"
 #include "chip_mail.h"
+#include "chip_words.h"
 #include "two_slots.h"
 
 #define NODE_RELAYS 4u      /* payloads of others that wait for their next hop */
@@ -24,6 +26,7 @@ enum node_side { NODE_UPPER = 0, NODE_LOWER = 1 };
 /* What the step's settings do not hold. */
 struct node_identity {
     int64_t mount_var;   /* rad^2, Q56, of the IMU against the tube's marks */
+    const uint8_t *block_key; /* BLOCK_KEY_SIZE bytes, of who may change its parameters; NULL: nobody */
     uint8_t tube;
 };
 
@@ -41,6 +44,8 @@ struct chip_kept {
     struct chip_mail mail;
     struct node_answer answers[NODE_ANSWERS];
     uint32_t next_answer;
+    struct block_kept block;
+    struct borechain_parameters corrections[1 + BORECHAIN_IMUS]; /* the block's, then each IMU's own, of the image */
 };
 
 struct node_relay {
@@ -62,12 +67,12 @@ struct chip_node {
     struct chip_kept kept;
     struct borechain_node record; /* up to `cycles` it is kept too */
     struct borechain_settings settings;
-    struct borechain_parameters parameters[1 + BORECHAIN_IMUS];
     struct node_identity identity;
     struct chip_clock clock;
     struct chip_end ends[2];
     struct node_relay relays[NODE_RELAYS];
     struct node_surveyed surveyed;
+    struct block_update update;
     struct slot_found found;
     const struct slot_board *flash;
     int64_t now_us;
@@ -104,5 +109,16 @@ void node_on_frame(
     int64_t now_us);
 /* What no frame brings: hello, the clock's questions, mail. */
 void node_advance(struct chip_node *node, int64_t now_us);
+
+/* For the node's parts: */
+uint32_t node_ms(int64_t us);
+/* us^2, of rig time, held at what stands for unknown. */
+int64_t node_clock_var(const struct chip_node *node);
+/* A place of the mail, of which it is to be filled at once; NULL where none can be had. */
+struct mail_item *node_mail_place(struct chip_node *node, bool is_needed);
+/* Where and when something is said under a number. */
+struct word_origin node_origin(const struct chip_node *node, int64_t number);
+/* A place of the mail was filled: it goes after the next save. */
+void node_keep(struct chip_node *node, struct mail_item *item, uint32_t length);
 
 #endif

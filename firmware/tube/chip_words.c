@@ -6,13 +6,13 @@
 
 #include "borechain_events.h"
 #include "msgpack.h"
+#include "word_envelope.h"
 
 #define BASE 251
 #define REPLY 9
 #define EVENT 10
 #define SURVEY 6
 #define DATED 4 /* version of the schema in which an epoch is said */
-#define PLAIN 1
 #define TIME_Q 28
 #define VAR_Q 56
 #define FORCE_Q 26
@@ -23,7 +23,7 @@
 #define NO_NUMBER (INT64_C(1) << 60)
 #define GRAVITY 980665 /* 1e-5 m/s^2 */
 
-static void open_envelope(struct pack_writer *to, int version, int kind, uint8_t tube, int64_t number)
+void word_envelope(struct pack_writer *to, int version, int kind, uint8_t tube, int64_t number)
 {
     pack_map(to, 6u);
     pack_text(to, "v");
@@ -39,7 +39,7 @@ static void open_envelope(struct pack_writer *to, int version, int kind, uint8_t
     pack_text(to, "b");
 }
 
-static void key_of_integer(struct pack_writer *to, const char *key, int64_t value)
+void word_integer(struct pack_writer *to, const char *key, int64_t value)
 {
     pack_text(to, key);
     pack_integer(to, value);
@@ -59,17 +59,17 @@ static uint32_t dated(const struct word_origin *origin)
 
 static void begin(struct pack_writer *to, const struct word_origin *origin, int kind, uint32_t fields)
 {
-    open_envelope(to, dated(origin) != 0u ? DATED : PLAIN, kind, origin->tube, origin->number);
+    word_envelope(to, dated(origin) != 0u ? DATED : WORDS_PLAIN, kind, origin->tube, origin->number);
     pack_map(to, fields + dated(origin));
-    key_of_integer(to, "t", origin->tube);
-    key_of_integer(to, "s", origin->number);
+    word_integer(to, "t", origin->tube);
+    word_integer(to, "s", origin->number);
     key_of_float(to, "at", origin->rig_at, TIME_Q);
 }
 
-static void end(struct pack_writer *to, const struct word_origin *origin)
+void word_end(struct pack_writer *to, const struct word_origin *origin)
 {
     if (dated(origin) != 0u) {
-        key_of_integer(to, "ep", origin->epoch);
+        word_integer(to, "ep", origin->epoch);
     }
 }
 
@@ -106,16 +106,16 @@ uint32_t word_survey(
 {
     struct pack_writer to = {room, size, 0u};
     begin(&to, origin, SURVEY, 11u);
-    key_of_integer(&to, "h", survey->hops);
+    word_integer(&to, "h", survey->hops);
     pack_text(&to, "i");
     pack_forces(&to, filter);
     key_of_float(&to, "y", (int64_t)survey->yaw * TURN, TURN_Q);
     key_of_float(&to, "yv", survey->yaw_var, VAR_Q);
     key_of_float(&to, "sv", survey->systematic_var, VAR_Q);
-    key_of_integer(&to, "n", survey->samples);
+    word_integer(&to, "n", survey->samples);
     key_of_float(&to, "st", survey->settle_time, TIME_Q);
-    key_of_integer(&to, "f", survey->flags);
-    end(&to, origin);
+    word_integer(&to, "f", survey->flags);
+    word_end(&to, origin);
     return packed_length(&to);
 }
 
@@ -130,10 +130,10 @@ bool word_event_is_error(int64_t code)
     return line != NULL && line->severity == 2u;
 }
 
-static void begin_event(struct pack_writer *to, const struct word_origin *origin, int severity, const char *name)
+void word_begin_event(struct pack_writer *to, const struct word_origin *origin, int severity, const char *name)
 {
     begin(to, origin, EVENT, 6u);
-    key_of_integer(to, "v", severity);
+    word_integer(to, "v", severity);
     pack_text(to, "c");
     pack_text(to, name);
     pack_text(to, "a");
@@ -170,21 +170,21 @@ uint32_t word_event(
     for (k = 0u; k < line->count; k++) {
         told += numbers[k] != NO_NUMBER ? 1u : 0u;
     }
-    begin_event(&to, origin, line->severity, line->name);
+    word_begin_event(&to, origin, line->severity, line->name);
     pack_map(&to, told);
     for (k = 0u; k < line->count; k++) {
         if (numbers[k] != NO_NUMBER) {
             pack_argument(&to, &line->arguments[k], numbers[k]);
         }
     }
-    end(&to, origin);
+    word_end(&to, origin);
     return packed_length(&to);
 }
 
 uint32_t word_start(const struct word_origin *origin, uint32_t yaw, int64_t worth, uint8_t *room, uint32_t size)
 {
     struct pack_writer to = {room, size, 0u};
-    begin_event(&to, origin, 0, worth < 0 ? "booted" : "restored");
+    word_begin_event(&to, origin, 0, worth < 0 ? "booted" : "restored");
     pack_map(&to, worth < 0 ? 1u : 2u);
     pack_text(&to, "yaw_deg");
     pack_float(&to, (int64_t)yaw * 360 >> (32 - DEGREES_Q), DEGREES_Q);
@@ -192,7 +192,7 @@ uint32_t word_start(const struct word_origin *origin, uint32_t yaw, int64_t wort
         pack_text(&to, "worth_h");
         pack_float(&to, worth / 3600, TIME_Q);
     }
-    end(&to, origin);
+    word_end(&to, origin);
     return packed_length(&to);
 }
 
@@ -205,10 +205,10 @@ uint32_t word_reply(
     uint32_t size)
 {
     struct pack_writer to = {room, size, 0u};
-    open_envelope(&to, PLAIN, REPLY, tube, order);
+    word_envelope(&to, WORDS_PLAIN, REPLY, tube, order);
     pack_map(&to, 4u);
-    key_of_integer(&to, "t", tube);
-    key_of_integer(&to, "s", order);
+    word_integer(&to, "t", tube);
+    word_integer(&to, "s", order);
     pack_text(&to, "d");
     pack_bool(&to, is_done);
     pack_text(&to, "x");
@@ -216,8 +216,7 @@ uint32_t word_reply(
     return packed_length(&to);
 }
 
-/* Reads the envelope; the body begins where `body` then stands. */
-static bool open_payload(const uint8_t *payload, uint32_t length, int64_t *kind, int64_t *target, struct pack_reader *body)
+bool word_body(const uint8_t *payload, uint32_t length, int64_t *kind, int64_t *target, struct pack_reader *body)
 {
     struct pack_reader from = {payload, length};
     uint32_t fields, k, key_length, found = 0u;
@@ -253,7 +252,7 @@ static bool open_payload(const uint8_t *payload, uint32_t length, int64_t *kind,
 bool word_open(const uint8_t *payload, uint32_t length, int64_t *kind, int64_t *target)
 {
     struct pack_reader body;
-    return open_payload(payload, length, kind, target, &body);
+    return word_body(payload, length, kind, target, &body);
 }
 
 static bool read_arguments(struct pack_reader *from, struct word_order *order)
@@ -291,7 +290,7 @@ bool word_read(const uint8_t *payload, uint32_t length, struct word_order *order
     const uint8_t *key;
     bool is_numbered = false;
     memset(order, 0, sizeof *order);
-    if (!open_payload(payload, length, &order->kind, &order->target, &from) || !read_map(&from, &fields)) {
+    if (!word_body(payload, length, &order->kind, &order->target, &from) || !read_map(&from, &fields)) {
         return false;
     }
     for (k = 0u; k < fields; k++) {

@@ -70,30 +70,39 @@ static int64_t worth_of(const struct borechain_node *record)
     return var / walk < LONGEST_WORTH >> 28 ? var / walk * (INT64_C(1) << 28) : LONGEST_WORTH;
 }
 
-bool memory_load(struct chip_node *node, const uint8_t *image, uint32_t image_size)
+/* As new, from the image alone. */
+static bool begin_anew(struct chip_node *node, const uint8_t *image, uint32_t image_size)
 {
-    struct borechain_config config;
-    uint8_t *const kept = (uint8_t *)node;
-    node->worth = -1;
-    if (borechain_load(image, image_size, &node->settings, node->parameters, &node->record) != BORECHAIN_LOADED) {
-        return false;
-    }
-    config = node->record.config;
-    slots_find(node->flash, &node->found);
-    if (node->found.slot != SLOT_NONE && node->found.length == KEPT_SIZE) {
-        slots_load(node->flash, &node->found, kept);
-        if (memcmp(node->kept.source, BORECHAIN_DIGEST, sizeof node->kept.source) == 0) {
-            node->worth = worth_of(&node->record);
-            memory_resume(&node->record, &config);
-            mail_resume(&node->kept.mail, 0u);
-            return true;
-        }
-        (void)borechain_load(image, image_size, &node->settings, node->parameters, &node->record);
-    }
     memset(&node->kept, 0, sizeof node->kept);
     memcpy(node->kept.source, BORECHAIN_DIGEST, sizeof node->kept.source);
     node->kept.hops = -1;
     node->kept.mail.next_number = 1;
+    block_begin(node);
+    return borechain_load(image, image_size, &node->settings, node->kept.corrections, &node->record) ==
+           BORECHAIN_LOADED;
+}
+
+bool memory_load(struct chip_node *node, const uint8_t *image, uint32_t image_size)
+{
+    struct borechain_config config;
+    node->worth = -1;
+    if (!begin_anew(node, image, image_size)) {
+        return false;
+    }
+    config = node->record.config;
+    slots_find(node->flash, &node->found);
+    if (node->found.slot == SLOT_NONE || node->found.length != KEPT_SIZE) {
+        return true;
+    }
+    slots_load(node->flash, &node->found, (uint8_t *)node);
+    if (memcmp(node->kept.source, BORECHAIN_DIGEST, sizeof node->kept.source) != 0) {
+        return begin_anew(node, image, image_size);
+    }
+    memcpy(&node->kept.corrections[1], borechain_image_corrections(image) + sizeof node->kept.corrections[0],
+        sizeof node->kept.corrections - sizeof node->kept.corrections[0]); /* an image may be provisioned anew */
+    node->worth = worth_of(&node->record);
+    memory_resume(&node->record, &config);
+    mail_resume(&node->kept.mail, 0u);
     return true;
 }
 

@@ -161,6 +161,11 @@ static int32_t age_of(int64_t now_q28, int64_t at)
                                                                  : BORECHAIN_NATIVE_NODE_STATE_INFINITE_AIDING_AGE;
 }
 
+static uint32_t first_bytes(const uint8_t *hash)
+{
+    return (uint32_t)hash[0] << 24 | (uint32_t)hash[1] << 16 | (uint32_t)hash[2] << 8 | (uint32_t)hash[3];
+}
+
 void state_of_node(const struct chip_node *node, int64_t now_us, struct borechain_native_node_state *state)
 {
     const struct borechain_node *const record = &node->record;
@@ -187,6 +192,9 @@ void state_of_node(const struct chip_node *node, int64_t now_us, struct borechai
     state->flags = node_flags(node, now_q28, is_dated);
     state->cycles = (uint32_t)record->cycles;
     state->overruns = (uint8_t)(record->overruns < 255 ? record->overruns : 255);
+    state->parameters_version = (uint16_t)node->kept.block.version;
+    state->parameters_hash_1 = first_bytes(&node->kept.block.in_use[0]);
+    state->parameters_hash_2 = first_bytes(&node->kept.block.in_use[4]);
     state->alignment_x = record->mount.method == 0 ? 0 : (int32_t)(record->mount.axis[0][0] * 1000000 >> 30);
     state->alignment_y = record->mount.method == 0 ? 0 : (int32_t)(record->mount.axis[0][1] * 1000000 >> 30);
     state->alignment_z = record->mount.method == 0 ? 0 : (int32_t)(record->mount.std[0][0] * 1000000 >> 40);

@@ -11,13 +11,17 @@ from node.kernels.arithmetic.formats import DEG, Array
 from node.kernels.filter.modes import UNBIASED_STILL_RATE
 from node.kernels.sensors.correction import COLDEST, HOTTEST, USUAL, correct_cycle, identity_parameters
 from telemetry.messages import Vector3
-from telemetry.parameters import POWERS, ParameterBlock, SensorParameters
+from telemetry.parameters import (
+    MAX_BIAS,
+    MAX_CONDITION,
+    MAX_DISTANCE,
+    MAX_DRIFT,
+    MAX_FORCE_ERROR,
+    POWERS,
+    ParameterBlock,
+    SensorParameters,
+)
 
-MAX_CONDITION = 4.0
-MAX_DISTANCE = 0.2  # of any entry of M from that of the identity or of the block before
-MAX_DRIFT = 0.1  # of any entry of M from its value at the reference, over the range of temperature
-MAX_BIAS = {"gyroscope": 20.0 * DEG, "accelerometer": 2.0}  # rad/s, m/s^2
-MAX_FORCE_ERROR = 0.05  # of gravity, at rest
 STILL_CYCLES = 4  # that must agree before a block is applied
 DIFFER_CYCLES = 8  # that must contradict before it is refused
 SENSORS = ("gyroscope", "accelerometer")

@@ -64,6 +64,12 @@ static inline uint32_t borechain_checksum(const unsigned char *at, size_t count)
     return ~sum;
 }
 
+/* Where the corrections of a good image lie: the block's in use, then each IMU's own. */
+static inline const unsigned char *borechain_image_corrections(const unsigned char *image)
+{
+    return image + 40 + sizeof(struct borechain_settings);
+}
+
 /* Records from an image of `size` bytes; those given are left alone where it is refused. */
 static inline enum borechain_loaded borechain_load(const unsigned char *image, size_t size,
     struct borechain_settings *settings, struct borechain_parameters parameters[1 + BORECHAIN_IMUS],

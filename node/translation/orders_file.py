@@ -5,22 +5,29 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
+from node.kernels.record.integer_node import FIXED_PARAMETERS
 from node.kernels.record.node_record import EVENTS
-from node.translation.c_file import HEADER, NODES, declare_arguments, rename_entries, write_code
+from node.translation.c_file import HEADER, NODES, SETTINGS_OF, declare_arguments, rename_entries, write_code
 from node.translation.c_lines import break_line
 from node.translation.c_program import CProgram
 from node.translation.c_structs import PREFIX, CStructs
+from node.translation.chip_blocks import judge_block, take_block, try_block
 from node.translation.chip_orders import next_event, order_alignment, order_record, order_survey, resume_filter
 from node.translation.kernel_source import integer_source
-from node.translation.kinds_of_values import INTEGER, ArrayOf, Kind, declare_variable
+from node.translation.kinds_of_values import INTEGER, ArrayOf, Kind, RecordOf, declare_variable
 
 ORDERS_HEADER, ORDERS_CODE = "borechain_orders.h", "borechain_orders.c"
 NUMBERS: Final = int(EVENTS["ring"].base["numbers"].shape[0])
+CORRECTIONS: Final = ArrayOf(RecordOf(FIXED_PARAMETERS), (1,))
+AXES: Final = ArrayOf(INTEGER, (3,))
 ORDERS: Final[dict[str, tuple[Callable[..., Any], tuple[Kind, ...]]]] = {
     "order_survey": (order_survey, (NODES,)),
     "order_record": (order_record, (NODES, INTEGER, INTEGER)),
     "order_alignment": (order_alignment, (NODES, INTEGER, INTEGER)),
     "resume_filter": (resume_filter, (NODES,)),
+    "judge_block": (judge_block, (CORRECTIONS, CORRECTIONS)),
+    "try_block": (try_block, (NODES, CORRECTIONS, AXES, AXES)),
+    "take_block": (take_block, (NODES, SETTINGS_OF, CORRECTIONS, CORRECTIONS, INTEGER)),
     "next_event": (next_event, (NODES, ArrayOf(INTEGER, (NUMBERS,)))),
 }
 ANSWERS: Final = """\
@@ -32,6 +39,28 @@ enum borechain_answer { /* to an order */
     BORECHAIN_FAULTY = 4,       /* a sensor is */
     BORECHAIN_TOO_FAST = 5,
     BORECHAIN_UNDER_WAY = 6     /* an alignment is */
+};
+
+enum borechain_fit { /* of a block of parameters; of an accelerometer BORECHAIN_ACCELEROMETER is added */
+    BORECHAIN_FIT = 0,
+    BORECHAIN_BAD_REFERENCE = 1,
+    BORECHAIN_BAD_MATRIX = 2,
+    BORECHAIN_DRIFTS = 3,
+    BORECHAIN_LARGE_BIAS = 4,
+    BORECHAIN_FAR = 5,
+    BORECHAIN_ACCELEROMETER = 8
+};
+
+enum borechain_trial { /* of a block in one cycle */
+    BORECHAIN_NO_REST = 0,
+    BORECHAIN_AGREES = 1,
+    BORECHAIN_DIFFERS = 2,
+    BORECHAIN_MAY_TURN = 3
+};
+
+enum borechain_changed { /* by a block, bits */
+    BORECHAIN_RATES = 1,
+    BORECHAIN_FORCES = 2
 };
 """
 

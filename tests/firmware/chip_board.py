@@ -63,7 +63,7 @@ def sizes_of(program: Path) -> tuple[int, int]:
 class TubeFlash:
     """The flash of a board, in a file that the emulator shares."""
 
-    def __init__(self, path: Path, settings: TubeSettings, folder: Path) -> None:
+    def __init__(self, path: Path, settings: TubeSettings, folder: Path, block_key: bytes = b"") -> None:
         self.path = path
         provision_node(settings, 1, folder)
         with path.open("wb") as file:
@@ -73,7 +73,8 @@ class TubeFlash:
                 file.seek(0x8000 + 0x4000 * slot)
                 file.write(b"\xff" * 0x4000)
             file.seek(BOARD_AT)
-            file.write(struct.pack("<IIqI", settings.tube, 0, round(settings.mount_std**2 * 2.0**56), 0))
+            mount_var = round(settings.mount_std**2 * 2.0**56)
+            file.write(struct.pack("<IIqII32s", settings.tube, bool(block_key), mount_var, 0, 0, block_key))
 
     def power_fails_after(self, words: int) -> None:
         """Let the power fail after so many more words of flash; 0: it holds."""

@@ -35,7 +35,7 @@ SHIM = Path(__file__).parent / "node_shim.c"
 GRAVITY = 9.80665
 NOTHING, FD = 255, 64
 STEP_US = 5000
-EXCHANGES, WRONG_ABOVE, WRONG_BELOW, BOOTS, NEXT_NUMBER, OVERFLOWS = range(6)
+EXCHANGES, WRONG_ABOVE, WRONG_BELOW, BOOTS, NEXT_NUMBER, OVERFLOWS, KEPT_BYTES, BLOCK_VERSION, UNTRUSTED = range(9)
 
 
 def build_node(folder: Path) -> ctypes.CDLL:
@@ -52,6 +52,7 @@ def build_node(folder: Path) -> ctypes.CDLL:
     objects = [str(Path(name).with_suffix(".o")) for name in (CODE, ORDERS_CODE, NATIVE_CODE)]
     library = load_checked(folder, [*objects, *own], *includes)
     library.shim_number.restype = ctypes.c_int64
+    library.shim_key(None)
     library.shim_next.restype = ctypes.c_uint8
     return library
 

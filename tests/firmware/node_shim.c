@@ -1,18 +1,21 @@
 /* A chip's node on this machine for its tests: one board with its flash in memory, whose power fails after so many words. */
 #include <setjmp.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "chip_node.h"
 #include "node_memory.h"
 
-#define SLOT_SIZE 0x4000u
+#define SLOT_SIZE 0x8000u /* of eight IMUs */
 
 static struct chip_node node;
 static uint8_t flash[2][SLOT_SIZE];
 static jmp_buf cut;
 static long words_left = -1;
 static bool is_worn;
+static uint8_t block_key[BLOCK_KEY_SIZE];
+static bool has_key;
 
 static void spend(void)
 {
@@ -52,6 +55,15 @@ void shim_clear(void)
     memset(flash, 0xFF, sizeof flash);
 }
 
+/* The key of its blocks; NULL: it has none. */
+void shim_key(const uint8_t *key)
+{
+    has_key = key != NULL;
+    if (has_key) {
+        memcpy(block_key, key, sizeof block_key);
+    }
+}
+
 void shim_wear(int worn)
 {
     is_worn = worn != 0;
@@ -67,6 +79,7 @@ int shim_begin(const uint8_t *image, uint32_t size, uint8_t tube, int64_t mount_
     struct node_identity identity;
     identity.tube = tube;
     identity.mount_var = mount_var;
+    identity.block_key = has_key ? block_key : NULL;
     if (setjmp(cut) != 0) {
         return -1;
     }
@@ -127,6 +140,12 @@ int64_t shim_number(int which)
         return node.kept.mail.next_number;
     case 5:
         return node.record.filter.overflows;
+    case 6:
+        return (int64_t)offsetof(struct chip_node, record) + (int64_t)offsetof(struct borechain_node, cycles);
+    case 7:
+        return node.kept.block.version;
+    case 8:
+        return node.update.untrusted;
     default:
         return -1;
     }
@@ -135,4 +154,9 @@ int64_t shim_number(int which)
 void shim_resume(struct borechain_node *record, const struct borechain_config *config)
 {
     memory_resume(record, config);
+}
+
+void shim_corrections(struct borechain_parameters *corrections)
+{
+    *corrections = node.kept.corrections[0];
 }

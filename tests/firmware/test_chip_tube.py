@@ -29,6 +29,7 @@ from sim.world.world import World
 from telemetry.media.can_loopback import register_loopback
 from telemetry.media.zenoh_bus import open_router
 from telemetry.messages import (
+    BlockStatus,
     Command,
     Event,
     NodeFlag,
@@ -36,7 +37,10 @@ from telemetry.messages import (
     Reply,
     StaticRecord,
     SurveyMeasurement,
+    UploadPhase,
 )
+from telemetry.parameters import ParameterBlock, SensorParameters
+from telemetry.transport.upload import Upload, split_block
 
 RIG, CHIP, ABOVE, BELOW = "chip-between", 2, 3, 1
 RECEIPTS = (Event, SurveyMeasurement, StaticRecord)
@@ -46,6 +50,8 @@ MINUTES = float(os.environ.get("BORECHAIN_CHIP_MINUTES", "2"))
 RATE_DPS = 71.0
 WORDS_UNTIL_CUT = 700  # of flash: within the content of a save
 FLASH, MEMORY = 192 * 1024, 32 * 1024
+BLOCK_KEY = bytes(range(32))
+BLOCK = ParameterBlock(CHIP, 1, accelerometer=SensorParameters(bias=(1e-3, 0.0, -1e-3)))  # its bias stays known
 pytestmark = [
     pytest.mark.statistical,
     pytest.mark.timeout(60.0 * MINUTES + 600.0),
@@ -80,7 +86,7 @@ class String:
         record_sensors(self.world, folder)
         told = self.world.tube_settings(CHIP)
         own = TubeSettings(CHIP, drive_joint=told.drive_joint, lower_joint=told.lower_joint)
-        self.flash = TubeFlash(folder / "flash.bin", own, folder)
+        self.flash = TubeFlash(folder / "flash.bin", own, folder, BLOCK_KEY)
         self.running: dict[str, Forked] = {}
         self._chip: EmulatedTube | None = None
 
@@ -162,9 +168,30 @@ def test_a_chip_between_two_tubes_loses_nothing_and_says_nothing_wrong(
     assert abs(yaw_error(string.world, CHIP, survey.yaw, survey.station_at)) < 0.02
     begun, number = time.monotonic(), 10
     while number == 10 or time.monotonic() - begun < 60.0 * (MINUTES - 2.0):
+        if number == 10:
+            upload_block(surface)
         survey = order_a_survey_and_cut_the_power(surface, string, number, survey)
         number += 2
+    state = surface.first(NodeState, lambda s: s.tube == CHIP)
+    assert (state.parameters_version, state.parameters_hash) == (1, BLOCK.sha256()[:8])  # over every cut
     judge_all(surface, string)
+
+
+def upload_block(surface: Surface) -> None:
+    """Upload a block to the chip until it says that it is in use, which takes a stop."""
+    upload, is_ended = (
+        Upload(split_block(BLOCK.canonical(), CHIP, 1, BLOCK.version, BLOCK_KEY), time.monotonic()),
+        False,
+    )
+    deadline = time.monotonic() + STOP + TURNING + PATIENCE
+    while not is_ended:
+        assert time.monotonic() < deadline
+        for segment in upload.due_segments(time.monotonic()):
+            surface.loop.call(lambda process, now, part=segment: process.endpoint.mail.send_segment(part))
+        heard = surface.first(BlockStatus | NodeState, lambda m: m.tube == CHIP)  # type: ignore[arg-type]
+        is_ended = isinstance(heard, BlockStatus) and upload.on_status(heard)
+    assert heard.phase is UploadPhase.APPLIED
+    assert heard.in_use == BLOCK.sha256()
 
 
 def order_a_survey_and_cut_the_power(

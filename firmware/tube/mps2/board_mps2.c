@@ -32,7 +32,8 @@
 #define IMAGE_SIZE 0x8000u
 #define SLOT(which) (FLASH + 0x8000u + 0x4000u * (which))
 #define SLOT_SIZE 0x4000u
-#define BOARD (FLASH + 0x10000u)             /* tube, variance of the mount (two words), words of flash before power fails */
+#define BOARD (FLASH + 0x10000u)             /* tube, whether it has a key, variance of the mount (two words), words of
+                                                flash before power fails, a word of nothing, the key of its blocks */
 #define POWER REGISTER(BOARD + 16u)          /* 0: it does not fail */
 #define OPEN_EVERY_MS 500u
 #define SENSOR 2u
@@ -258,6 +259,7 @@ int main(void)
     uint32_t side;
     begin_board();
     identity.tube = (uint8_t)REGISTER(BOARD);
+    identity.block_key = REGISTER(BOARD + 4u) != 0u ? (const uint8_t *)(BOARD + 24u) : NULL;
     memcpy(&identity.mount_var, (const uint8_t *)(BOARD + 8u), sizeof identity.mount_var);
     is_known = node_begin(&node, (const uint8_t *)FLASH, IMAGE_SIZE, &identity, &flash, 0xB0CE0000u, now_us());
     while (is_known) {
