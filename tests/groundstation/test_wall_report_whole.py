@@ -6,6 +6,7 @@ are those of straight holes with told covariances, which have a closed form.
 
 import math
 import re
+import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import date
@@ -37,7 +38,8 @@ from groundstation.survey.wall.voids import Void
 from groundstation.survey.wall.wall_file import Wall, read_wall
 from groundstation.survey.wall.wall_verdict import VoidFinding, WallVerdict
 
-APPROVED = Path(__file__).parents[1] / "data" / "reports" / "words.txt"
+APPROVED = Path(__file__).parents[1] / "data" / "reports"
+OTHERS = ["de", "es", "fr", "it"]
 DAY = date(2026, 11, 20)
 
 
@@ -325,14 +327,34 @@ def lines_of(content: dict[str, Any]) -> list[str]:
     return [*lines, " | ".join(content["signed_by"]), *content["labels"].values()]
 
 
-@pytest.mark.parametrize("language", ["de", "es", "fr", "it"])
-def test_every_word_in_other_languages(report: Document, wall: Wall, language: str) -> None:
-    """As it was read and approved; the numbers are those of the English report, whose cells are computed above."""
+def said_in(wall: Wall, language: str) -> dict[str, tuple[list[str], list[str]]]:
+    """File of what was approved, and what the report of the wall or of a column says: in the language, and in English."""
     records = {record.design.name: record for record in column_records(wall, judgement_of(wall))}
     some = [column_report(records[name], site_of(wall), origin()) for name in "BCDF"]
-    for name, one in zip(("wall", *"BCDF"), (report, *some), strict=True):
-        said, english = (lines_of(document_content(replace(one, origin=origin(to)))) for to in (language, "en"))
-        approved = APPROVED.with_name(f"wall-report-{name}-{language}.txt".lower())
-        assert said == approved.read_text("utf-8").splitlines(), approved.name
+    whole = wall_report(wall, judgement_of(wall), origin())
+    documents = dict(zip(("wall", *"bcdf"), (whole, *some), strict=True))
+
+    def lines_in(document: Document, to: str) -> list[str]:
+        return lines_of(document_content(replace(document, origin=origin(to))))
+
+    return {
+        f"wall-report-{name}-{language}.txt": (lines_in(document, language), lines_in(document, "en"))
+        for name, document in documents.items()
+    }
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_every_word_in_other_languages(wall: Wall, language: str) -> None:
+    """As it was read and approved; the numbers are those of the English report, whose cells are computed above."""
+    for name, (said, english) in said_in(wall, language).items():
+        assert said == (APPROVED / name).read_text("utf-8").splitlines(), name
         numbers = [sorted(re.findall(r"\d+(?:\.\d+)?", line)) for line in said]
         assert numbers == [sorted(re.findall(r"\d+(?:\.\d+)?", line)) for line in english]
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as folder:
+        approved = read_wall(write_wall(Path(folder)))
+    for other in OTHERS:
+        for file, (words, _) in said_in(approved, other).items():
+            (APPROVED / file).write_text("\n".join(words) + "\n", "utf-8")

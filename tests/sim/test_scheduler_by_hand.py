@@ -6,10 +6,11 @@ import json
 import math
 from collections import defaultdict
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
-from seeded_worlds import FIGURES, SEED, STRING, figure_of
+from seeded_worlds import SEED, STRING, figure_of
 
 from node.kernels.arithmetic.formats import PERIOD
 from sim.rig.rig_progress import RigProgress
@@ -28,6 +29,7 @@ TABLES = change_sections(
     medium={"latency_ms": 1e3 * LATENCY, "jitter_ms": 0.0, "loss": 0.0, "duplicate": 0.0},
 )
 FAULTS = ("kill-node:1@60+7.5",)
+KEPT = Path(__file__).parents[1] / "data" / "scheduled_steps.json"
 NEXT = 0.4  # s, after its newest event each process wants to wake
 
 
@@ -84,12 +86,22 @@ class NotingStepper:
         return answers
 
 
-@pytest.fixture(scope="module")
-def run() -> tuple[World, NotingStepper, bool]:
+def run_noted() -> tuple[World, NotingStepper, bool]:
     world = World(scenario_of(dict(TABLES), FAULTS), SEED)
     stepper = NotingStepper(world)
     finished = Scheduler(world, stepper, stepper.follow).run()  # type: ignore[arg-type]
     return world, stepper, finished
+
+
+def figure_of_steps(stepper: NotingStepper) -> dict[str, float]:
+    """Number of events, and one figure of all of them in their order."""
+    rows = [(address, int(kind), at, len(frame)) for address, kind, at, _, frame in stepper.steps]
+    return {"events": len(rows), "figure": figure_of(rows)}
+
+
+@pytest.fixture(scope="module")
+def run() -> tuple[World, NotingStepper, bool]:
+    return run_noted()
 
 
 def of_kind(stepper: NotingStepper, address: int, kind: Due) -> list[tuple[float, Any, bytes]]:
@@ -191,11 +203,7 @@ def test_tubes_are_wanted_as_they_are_added_and_one_without_power_is_not(run: An
 
 def test_the_whole_of_it_is_what_it_was(run: Any) -> None:
     """Beside the rest: one figure of every event in its order."""
-    _, stepper, _ = run
-    kept = json.loads(FIGURES.read_text())["scheduled"]
-    rows = [(address, int(kind), at, len(frame)) for address, kind, at, _, frame in stepper.steps]
-    assert len(rows) == kept["events"]
-    assert figure_of(rows) == pytest.approx(kept["figure"], rel=1e-9)
+    assert figure_of_steps(run[1]) == pytest.approx(json.loads(KEPT.read_text()), rel=1e-9)
 
 
 def test_what_hangs_is_ended_once_and_a_stop_ends_after_the_round() -> None:
@@ -219,3 +227,7 @@ def test_what_hangs_is_ended_once_and_a_stop_ends_after_the_round() -> None:
     scheduler.stop()
     scheduler.advance()
     assert stepper.rounds == rounds
+
+
+if __name__ == "__main__":
+    KEPT.write_text(json.dumps(figure_of_steps(run_noted()[1]), indent=1) + "\n", encoding="utf-8")
