@@ -328,7 +328,7 @@ def lines_of(content: dict[str, Any]) -> list[str]:
 
 
 def said_in(wall: Wall, language: str) -> dict[str, tuple[list[str], list[str]]]:
-    """File of what was approved, and what the report of the wall or of a column says: in the language, and in English."""
+    """File of what was approved, and what a report of the wall or of a column says: there, and in English."""
     records = {record.design.name: record for record in column_records(wall, judgement_of(wall))}
     some = [column_report(records[name], site_of(wall), origin()) for name in "BCDF"]
     whole = wall_report(wall, judgement_of(wall), origin())
