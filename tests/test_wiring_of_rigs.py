@@ -41,7 +41,8 @@ def test_a_rig_has_a_process_a_tube_and_three_more(tmp_path: Path, has_keys: boo
     assert list(table.specs) == ["medium", "encoder", "base", "1", "2", "3"]
     medium, encoder, base = (table.specs[name] for name in ("medium", "encoder", "base"))
     assert medium.target is run_medium
-    assert medium.arguments[1:] == (Path("x.toml"), 7, 2.5, ("node 1 at 3",), False, True, transports, "")
+    frames = "" if has_keys else f"unixsock-stream/{tmp_path}/frames"
+    assert medium.arguments[1:] == (Path("x.toml"), 7, 2.5, ("node 1 at 3",), False, True, transports, "", frames)
     assert encoder.target is run_encoder
     assert encoder.arguments[1:3] == (None, None)
     assert encoder.arguments[3].drilling == 123.0
@@ -64,9 +65,10 @@ def test_a_rig_has_a_process_a_tube_and_three_more(tmp_path: Path, has_keys: boo
     }
     named = {"medium": BASE, "base": BASE, "encoder": ENCODER}
     for name, place in places.items():
-        assert (place.rig, place.endpoint, place.steps, place.keys) == ("r", "tcp/127.0.0.1:9", steps, keys)
-        assert place.key_file == (None if has_keys else tmp_path / "rig.key")
         address = named[name] if name in named else int(name)
+        met_at = "tcp/127.0.0.1:9" if has_keys or address == BASE else frames
+        assert (place.rig, place.endpoint, place.steps, place.keys) == ("r", met_at, steps, keys)
+        assert place.key_file == (None if has_keys else tmp_path / "rig.key")
         assert place.media == transports.media_of(address)
     assert (tmp_path / "rig.key").exists() is not has_keys
 

@@ -19,7 +19,7 @@ import numpy as np
 from node.errors import SensorError
 from node.process.drivers.fifo_window import parts_of
 from node.process.drivers.source import ImuSample
-from node.process.drivers.waiting_bytes import read_waiting
+from node.process.drivers.waiting_bytes import FOLLOWS_S, read_waiting
 
 RATE: Final = 100  # Hz, of its lines
 IMU_LINES: Final = 19  # of register 6
@@ -89,7 +89,7 @@ class Vn100:
         if self._file < 0:
             raise SensorError(f"vn100: {self._path}: not started")
         try:
-            data = self._rest + read_waiting(self._file)
+            data = self._rest + read_waiting(self._file, FOLLOWS_S)
         except OSError as error:
             raise SensorError(f"vn100: {self._path}: {error.strerror}: the line is gone") from error
         *lines, self._rest = data.split(b"\n")
