@@ -25,6 +25,11 @@ print(json.dumps([fields_of(FIXED_NODE), fields_of(FIXED_SETTINGS), sizes]))
 HERE = Path(__file__).parent / "chip"
 RISCV_MEMORY = ("flash=0x80000000", "flash_size=0x400000", "ram=0x80400000", "ram_size=0x1000000", "stack_size=0x8000")
 HOST = ("-std=gnu99", "-O1", "-fwrapv")
+CHECKED = ("-fno-wrapv", "-fsanitize=undefined,bounds-strict,address", "-fno-sanitize-recover=all")
+TRAPPED = (
+    "-DTRAPPED", "-D_POSIX_C_SOURCE=200809L", "-fno-wrapv", "-fsanitize=undefined,bounds-strict",
+    "-fsanitize-undefined-trap-on-error",
+)  # fmt: skip
 
 
 def run_program(

@@ -6,7 +6,7 @@ import numpy as np
 from one_node import node_of
 from rough_node import RoughNode
 from string_of_one import StringOfOne
-from test_every_event import CASES, known
+from test_every_event import CASES, FAST, LEARN, SLOW, TWO, Bench, Numbers, held, known, warmed
 from test_smoothing import OUTAGES
 
 from node.kernels.arithmetic.formats import DEG
@@ -35,6 +35,47 @@ def aligned(method: str) -> None:
     bench = known()
     assert bench.tube.align(method, 1.0) == ""
     bench.cycles(1).cycles(120, 7.0 * DEG).cycles(60)
+
+
+def tilted(across: float, along: float) -> Callable[[Numbers, Numbers], tuple[Numbers, Numbers]]:
+    """Readings of a node whose gravity has so much more across its axis, and so much along it."""
+    return lambda w, f: (w, (across * f[0], across * f[1], along * f[2]))
+
+
+def offset(w: Numbers, f: Numbers) -> tuple[Numbers, Numbers]:
+    """Readings of an IMU that is mounted askew by some ten degrees."""
+    return w, (f[0] + 0.2 * f[2], f[1], 0.98 * f[2])
+
+
+def shaken(w: Numbers, f: Numbers) -> tuple[Numbers, Numbers]:
+    """Readings of a node that swings, its own last numbers decide which way."""
+    swing = 0.2 if int(f[0] * 1e7) % 2 else -0.2
+    return w, (f[0] + swing, f[1] - swing, f[2])
+
+
+def refused_alignments() -> Iterator[Callable[[], object]]:
+    """Turns of which no alignment comes: each reason once."""
+
+    def begun(
+        spoil: Callable[[Numbers, Numbers], tuple[Numbers, Numbers]] = lambda w, f: (w, f), two: bool = False
+    ) -> Bench:
+        bench = Bench(TWO if two else None).cycles(LEARN, spoil=spoil)
+        assert bench.tube.align("circle", 1.0) == ""
+        return bench.cycles(1, spoil=spoil)
+
+    for spoil in (tilted(0.02, 1.0), tilted(28.0, 0.2), offset, shaken):
+        yield lambda spoil=spoil: begun(spoil).cycles(120, SLOW, spoil).cycles(3)
+    yield lambda: begun().cycles(10, SLOW).cycles(4, -SLOW)
+    yield lambda: begun().cycles(10, SLOW).cycles(20)
+    yield lambda: begun().cycles(400)
+    yield lambda: begun(two=True).cycles(10, SLOW).cycles(8, SLOW, held)
+    yield lambda: begun().cycles(10, SLOW, aided=False).cycles(4, 0.2 * SLOW)
+
+
+def alone() -> None:
+    """Nodes that hear of no head: at rest, warmed, at rest; and from the first cycle on."""
+    known().cycles(130, aided=False).cycles(130, spoil=warmed, aided=False).cycles(20, FAST, aided=False)
+    Bench().cycles(130, spoil=warmed, aided=False).cycles(130, aided=False).cycles(20, FAST)
 
 
 def failed() -> None:

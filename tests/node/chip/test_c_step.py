@@ -10,20 +10,13 @@ import sys
 from pathlib import Path
 
 import pytest
-from chip_tools import compile_replay, layout_of_one, needs, needs_gcc, run_program, said_numbers
+from chip_tools import CHECKED, TRAPPED, compile_replay, layout_of_one, needs, needs_gcc, run_program, said_numbers
 from chip_worlds import every_world, rough_node
 from drawn_calls import record_drawn_calls
 from recorded_calls import record_calls
 
 from node.translation.c_file import CODE, HEADER, CFiles, write_c_files
 from node.translation.imu_limit import write_for_imus
-
-CHECKED = ("-fno-wrapv", "-fsanitize=undefined,bounds-strict,address", "-fno-sanitize-recover=all")
-
-TRAPPED = (
-    "-DTRAPPED", "-D_POSIX_C_SOURCE=200809L", "-fno-wrapv", "-fsanitize=undefined,bounds-strict",
-    "-fsanitize-undefined-trap-on-error",
-)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
