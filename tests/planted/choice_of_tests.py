@@ -15,7 +15,7 @@ MOST = 6  # files
 WHOLE = {  # quick tests that look at a whole room: without importing it, or from a folder of which none is chosen
     "borechain/cli/": ("test_options_whole.py",),
     "borechain/gauntlet/": ("gauntlet/test_oracles_by_hand.py", "gauntlet/test_wellness_by_hand.py"),
-    "borechain/studies/": ("studies/test_studies_whole.py",),
+    "borechain/studies/": ("studies/test_studies_whole.py", "studies/test_set_up_study_whole.py"),
 }
 IMPORT = re.compile(r"^ *(?:from|import) ([\w.]+)(?: import ([\w, ]*))?", re.MULTILINE)
 
