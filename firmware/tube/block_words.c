@@ -138,6 +138,28 @@ uint32_t word_applied(
     return packed_length(&to);
 }
 
+/* An event with a block's version, why, and a number that has a name. */
+static uint32_t word_why(
+    const struct word_origin *origin,
+    int severity,
+    const char *code,
+    int64_t version,
+    const char *reason,
+    const char *name,
+    uint32_t number,
+    uint8_t *room,
+    uint32_t size)
+{
+    struct pack_writer to = {room, size, 0u};
+    word_begin_event(&to, origin, severity, code);
+    pack_map(&to, 3u);
+    word_integer(&to, "version", version);
+    key_of_text(&to, "reason", reason);
+    word_integer(&to, name, number);
+    word_end(&to, origin);
+    return packed_length(&to);
+}
+
 uint32_t word_refused(
     const struct word_origin *origin,
     int64_t version,
@@ -146,14 +168,7 @@ uint32_t word_refused(
     uint8_t *room,
     uint32_t size)
 {
-    struct pack_writer to = {room, size, 0u};
-    word_begin_event(&to, origin, ERROR, "parameters_refused");
-    pack_map(&to, 3u);
-    word_integer(&to, "version", version);
-    key_of_text(&to, "reason", reason);
-    word_integer(&to, "in_use", in_use);
-    word_end(&to, origin);
-    return packed_length(&to);
+    return word_why(origin, ERROR, "parameters_refused", version, reason, "in_use", in_use, room, size);
 }
 
 uint32_t word_untrusted(
@@ -164,12 +179,5 @@ uint32_t word_untrusted(
     uint8_t *room,
     uint32_t size)
 {
-    struct pack_writer to = {room, size, 0u};
-    word_begin_event(&to, origin, WARNING, "upload_untrusted");
-    pack_map(&to, 3u);
-    word_integer(&to, "version", version);
-    key_of_text(&to, "reason", reason);
-    word_integer(&to, "segments", segments);
-    word_end(&to, origin);
-    return packed_length(&to);
+    return word_why(origin, WARNING, "upload_untrusted", version, reason, "segments", segments, room, size);
 }
