@@ -61,7 +61,6 @@ COMMANDS = {
     ),
     "experiment": ("borechain.cli.experiment.experiment", "experiment", "Rerun a published experiment beside ours."),
 }
-ONE_THREAD = ("ground", "bench")  # whose matrices are small: a second thread would wait most of the time
 
 
 class LazyGroup(click.Group):
@@ -77,10 +76,9 @@ class LazyGroup(click.Group):
         del ctx
         if cmd_name not in COMMANDS:
             return None
-        if cmd_name in ONE_THREAD:
-            from telemetry.runtime.one_thread import one_thread_each
+        from telemetry.runtime.one_thread import one_thread_each
 
-            one_thread_each()  # before the library of matrices is loaded
+        one_thread_each()  # before the library of matrices is loaded
         module, attribute, _ = COMMANDS[cmd_name]
         command: click.Command = getattr(importlib.import_module(module), attribute)
         return command

@@ -10,6 +10,7 @@ import pytest
 from forked_commands import run
 
 from borechain.__main__ import COMMANDS
+from telemetry.runtime.one_thread import ONE_THREAD
 
 
 @pytest.mark.slow
@@ -116,3 +117,17 @@ def test_a_shell_gets_its_completion_script() -> None:
 
 def test_the_version_is_told() -> None:
     assert run("--version").stdout.startswith("borechain, version ")
+
+
+@pytest.mark.parametrize(("told", "threads"), [(None, "1"), ("2", "2")])
+def test_matrices_are_multiplied_in_one_thread_unless_the_environment_says_how_many(
+    told: str | None, threads: str
+) -> None:
+    environment = {name: value for name, value in os.environ.items() if name not in ONE_THREAD}
+    environment |= dict.fromkeys(ONE_THREAD, told) if told else {}
+    lines = (
+        "import os; from borechain.__main__ import cli; cli(['check', '--help'], standalone_mode=False)\n"
+        f"print(*map(os.environ.get, {ONE_THREAD}))"
+    )
+    said = subprocess.run([sys.executable, "-c", lines], env=environment, capture_output=True, text=True, check=True)
+    assert said.stdout.splitlines()[-1].split() == [threads] * len(ONE_THREAD)
