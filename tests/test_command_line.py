@@ -72,6 +72,21 @@ def test_a_name_that_is_wrong_is_told_before_a_rig_that_runs() -> None:
     assert "did you mean wellbore-1?" in done.stderr
 
 
+def test_a_folder_that_is_used_is_told_before_a_kernel_is_compiled(tmp_path: Path) -> None:
+    used, line = tmp_path / "used", tmp_path / "line.txt"
+    used.mkdir()
+    (used / "result.json").write_text("{}")
+    line.write_text("no folder")
+    begun = "from borechain.cli.rig import rig_command; rig_command.compile_for_rig = lambda *_: print('begun'); "
+    for folder, said in ((used, "expected a new or empty folder, it holds an earlier run"), (line, "Not a directory")):
+        call = f"{begun}rig_command.rig(['wellbore-1', '--inline', '--out', {str(folder)!r}])"
+        done = subprocess.run([sys.executable, "-c", call], capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stdout) == (1, ""), done.stderr
+        assert f"output folder {folder}: {said}" in done.stderr
+    assert (used / "result.json").read_text() == "{}"
+    assert line.read_text() == "no folder"
+
+
 @pytest.mark.slow
 def test_options_may_stand_in_a_file(tmp_path: Path) -> None:
     path = tmp_path / "node.toml"

@@ -68,25 +68,44 @@ def check_port_free(endpoint: str) -> None:
             ) from error
 
 
+def refuse_used_folder(folder: Path) -> None:
+    """Refuse an output folder with anything in it: a run must not continue another one's saved states.
+
+    Raises
+    ------
+    RigError
+        When it holds an earlier run, or is no folder that can be read.
+    """
+    try:
+        if folder.exists() and any(folder.iterdir()):
+            raise RigError(
+                f"output folder {folder}: expected a new or empty folder, it holds an earlier run; choose another --out"
+            )
+    except OSError as error:
+        raise unwritable(folder, error) from error
+
+
 def prepare_folder(folder: Path) -> None:
-    """Make the output folder; it must be new or empty, for a run must not continue another one's saved states.
+    """Make the output folder; it must be new or empty.
 
     Raises
     ------
     RigError
         When it cannot be made or written, or holds an earlier run.
     """
+    refuse_used_folder(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        if any(folder.iterdir()):
-            raise RigError(
-                f"output folder {folder}: expected a new or empty folder, it holds an earlier run; choose another --out"
-            )
         trial = folder / ".writable"
         trial.touch()
         trial.unlink()
     except OSError as error:
-        raise RigError(f"output folder {folder}: {error.strerror}; choose a writable folder with --out") from error
+        raise unwritable(folder, error) from error
+
+
+def unwritable(folder: Path, error: OSError) -> RigError:
+    """The refusal of an output folder that cannot be used."""
+    return RigError(f"output folder {folder}: {error.strerror}; choose a writable folder with --out")
 
 
 class Launcher:

@@ -112,20 +112,22 @@ def rig(job: RigJob, page: PageRequest, view: str | None, as_json: bool) -> None
 
 
 def checked_job(job: RigJob, page: PageRequest) -> RigJob:
-    """The job with its page, when nothing in it contradicts itself and its addresses are free.
+    """The job with its page, when nothing in it contradicts itself, its folder is new and its addresses are free.
 
     Raises
     ------
     InputFault, ScenarioError
         Wrong options, or no scenario of that name.
     RigError, PageError
-        An address that is taken.
+        A folder that is used, an address that is taken.
     """
     from groundstation.gateway.page.page_settings import open_page_socket
-    from sim.rig.launcher import check_port_free
+    from sim.rig.launcher import check_port_free, refuse_used_folder
     from sim.world.shipped import find_scenario
 
     find_scenario(job.scenario)  # a wrong name is told before a rig that is running already
+    if job.out is not None:
+        refuse_used_folder(job.out)  # and a folder before a minute of compiling
     if job.inline != (job.transport == "can-native") and job.transport is not None:
         raise InputFault(
             f"--transport {job.transport}: expected {'real processes' if job.inline else '--inline'} with it; "
