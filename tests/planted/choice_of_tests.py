@@ -1,4 +1,7 @@
-"""Which test files are to notice a defect: those that are named, or those that import its module, nearest first."""
+"""Which test files are to notice a defect: those that are named, or those that import its module, nearest first.
+
+Where few import it, those of who uses it are added.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from defect_lists import Defect, DefectError
 COSTLY = ("processes", "studies", "page", "gauntlet", "truth", "planted", "tools")  # folders that are named, not chosen
 FEW = 3  # files; where fewer import the module itself, those are added that import who imports it
 MOST = 6  # files
+FARTHEST = 4  # imports between a test and a module that no test imports itself
 WHOLE = {  # quick tests that look at a whole room: without importing it, or from a folder of which none is chosen
     "borechain/cli/": ("test_options_whole.py",),
     "borechain/gauntlet/": ("gauntlet/test_oracles_by_hand.py", "gauntlet/test_wellness_by_hand.py"),
@@ -31,9 +35,9 @@ def choose_tests(defect: Defect, root: Path) -> list[str]:
     wanted = {module}
     chosen = [test for room, tests in WHOLE.items() if defect.file.startswith(room) for test in tests]
     at_most = MOST + len(chosen)
-    for _ in range(2):
+    for away in range(FARTHEST):
         chosen += _nearest_first(module, root, wanted, chosen)
-        if len(chosen) >= FEW + at_most - MOST:
+        if len(chosen) >= FEW + at_most - MOST or (chosen and away > 0):
             break
         wanted = {user for user, uses in _imports_of_sources(root).items() if uses & wanted}
     if not chosen:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from choice_of_tests import choose_tests
 from defect_lists import KINDS, ROOT, Defect, DefectError, read_defects, sample_of
-from mutants import AREAS, changes_of, drawn_mutants, files_of, mutant_of
+from mutants import AREAS, TRUSTED, changes_of, drawn_mutants, files_of, mutant_of
 
 DEFECTS = read_defects()
 
@@ -69,6 +69,13 @@ def test_who_looks_at_a_whole_room_is_chosen_beside_who_imports_the_module() -> 
     assert "test_options_whole.py" not in choose_tests(
         Defect("a name", "one", 1, "borechain/crew/app.py", "a", "b"), ROOT
     )
+
+
+def test_every_module_of_which_mutants_are_drawn_has_tests_that_are_to_notice() -> None:
+    for area in (*AREAS, *TRUSTED):
+        for file in filter(changes_of, files_of(ROOT, area)):
+            name = file.relative_to(ROOT).as_posix()
+            assert choose_tests(Defect(name, area, 8, name, "a", "b"), ROOT), name
 
 
 SOURCE = '''"""± 1 < 2 of a docstring, which is no part of it."""
