@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import ncx2
 
 from groundstation.service.alarms import verdict
-from groundstation.service.alarms.verdict import Deadline, Known, judge_hole
+from groundstation.service.alarms.verdict import Deadline, Known, correction_deadline, judge_hole
 from groundstation.service.alarms.verdict_words import VerdictDoubt, Word
 from groundstation.survey.path.normal_mixture import NormalMixture
 from groundstation.survey.wall.column_deviation import Deviation
@@ -152,3 +153,14 @@ def test_of_an_end_out_however_open(metres: float, expected: Word) -> None:
     end = ending(0.0, metres=metres, surveyed=0.25)
     found = judge_hole(Known(TARGET, CURVATURE, STOP, TARGET, off(0.0), end))
     assert (found.word, found.by_surveys) == (expected, Word.OUT)
+
+
+@pytest.mark.parametrize(("bit", "way"), [(19.5, 0.5), (20.0, 0.0), (20.5, 0.0), (17.0, 3.0)])
+def test_of_the_way_that_a_correction_has(bit: float, way: float) -> None:
+    """Along the way left it bends the end by k way^2 / 2: 1.25 mm in half a metre; beyond its end by nothing."""
+    ends = Deviation(12.0, 12.0, np.array([0.52, 0.0]), 1e-4 * np.eye(2), LIMIT)
+    end = ProjectedEnd(ends, NormalMixture(np.ones(1), ends.offset[None], ends.cov[None]), 1e-6 * np.eye(2))
+    found = correction_deadline(end, Known(TARGET, CURVATURE, STOP, bit, off(0.0), end))
+    reach = LIMIT + 0.5 * CURVATURE * way**2
+    assert found.best == pytest.approx(ncx2.cdf((reach / 0.01) ** 2, 2, 52.0**2), rel=1e-6)
+    assert found.left == pytest.approx(found.before - bit, abs=1e-12)
