@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import ncx2
 
 from groundstation.service.alarms import verdict
-from groundstation.service.alarms.verdict import Deadline, Known, correction_deadline, judge_hole
+from groundstation.service.alarms.verdict import Deadline, Known, correction_deadline, judge_hole, missed_text
 from groundstation.service.alarms.verdict_words import VerdictDoubt, Word
 from groundstation.survey.path.normal_mixture import NormalMixture
 from groundstation.survey.wall.column_deviation import Deviation
@@ -164,3 +164,10 @@ def test_of_the_way_that_a_correction_has(bit: float, way: float) -> None:
     reach = LIMIT + 0.5 * CURVATURE * way**2
     assert found.best == pytest.approx(ncx2.cdf((reach / 0.01) ** 2, 2, 52.0**2), rel=1e-6)
     assert found.left == pytest.approx(found.before - bit, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("before", "told"), [(0.04, "95 % was to be had until 0.0 m"), (0.0, "95 % was never to be had")]
+)
+def test_of_a_depth_that_was_the_last(before: float, told: str) -> None:
+    assert missed_text(0.95, before) == told
