@@ -61,7 +61,7 @@ COMMANDS = {
     ),
     "experiment": ("borechain.cli.experiment.experiment", "experiment", "Rerun a published experiment beside ours."),
 }
-ONE_THREAD = ("ground", "bench")  # whose matrices are small: a second thread would wait most of the time
+ONE_THREAD = ("ground", "bench", "gauntlet")  # whose matrices are small: a second thread would wait most of the time
 
 
 class LazyGroup(click.Group):
