@@ -52,7 +52,7 @@ from groundstation.service.disk.database_tables import (
     add_new,
 )
 from groundstation.service.disk.moment_record import DamagedMomentError, moment_of_bytes, moment_to_bytes
-from groundstation.service.disk.row_digest import as_read, digested, is_sound
+from groundstation.service.disk.row_digest import add_digest, as_read, is_sound
 from groundstation.service.hole.history import Moment
 from groundstation.service.setup.told_value import DamagedSetupError, ToldValue, told_of_text, told_to_text
 from groundstation.service.string.depth import NEVER, DepthDoubt, Instant
@@ -126,7 +126,7 @@ class Store(Database):
             its = {"its_epoch": stand.epoch, "its_begin": begun_at, "its_end": ended_at, "its_md": md}
             connection.execute(DROP_OVERLAPS, its)
             row = {"epoch": stand.epoch, "begun_at": begun_at, "ended_at": ended_at, "md": md}
-            connection.execute(ADD_STAND, digested(row))
+            connection.execute(ADD_STAND, add_digest(row))
 
     def messages(self) -> Iterator[Stored[Kept]]:
         """Everything stored, in the order of arrival; what is damaged is passed over and counted."""
@@ -177,7 +177,7 @@ class Store(Database):
     def keep_joints(self, joints: Mapping[Pair, JointAngle]) -> None:
         """Store the angles of the joints, in the place of those stored before."""
         rows = [
-            digested({"upper": upper, "lower": lower, "angle": as_read(joint.angle), "var": as_read(joint.var)})
+            add_digest({"upper": upper, "lower": lower, "angle": as_read(joint.angle), "var": as_read(joint.var)})
             for (upper, lower), joint in joints.items()
         ]
         with self._writing() as connection:
@@ -268,7 +268,7 @@ class Store(Database):
         """
         with self._writing() as connection:
             connection.execute(DROP_SETUP, {"its_number": told.number})
-            connection.execute(ADD_SETUP, digested({"number": told.number, "content": told_to_text(told)}))
+            connection.execute(ADD_SETUP, add_digest({"number": told.number, "content": told_to_text(told)}))
 
     def told(self) -> list[ToldValue]:
         """What was told of the setup, the oldest first; what is damaged is passed over and counted."""

@@ -10,7 +10,7 @@ from telemetry.presentation.content import content_of
 DIGEST = "digest"
 
 
-def digested(row: Mapping[str, Any]) -> dict[str, Any]:
+def add_digest(row: Mapping[str, Any]) -> dict[str, Any]:
     """A row with its hash."""
     return {**row, DIGEST: digest_of(row)}
 
