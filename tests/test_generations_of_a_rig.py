@@ -12,6 +12,7 @@ import pytest
 
 from borechain.pki import rig_keys
 from borechain.pki.rig_keys import add_tube, init_rig, read_secret, retire_keys, revoke_tube, rotate_keys
+from telemetry.errors import KeyFileError
 from telemetry.messages import BASE, ENCODER
 from telemetry.transport.key_ring import KeyRing, key_file, read_ring
 
@@ -100,3 +101,25 @@ def changes(folder: Path) -> Iterator[Callable[[], object]]:
     yield lambda: rotate_keys(folder, NOW + HOUR)
     yield lambda: retire_keys(folder)
     yield lambda: rotate_keys(folder, NOW + 2 * HOUR)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("[[generation]]", "[[generations]]", "expected what borechain pki wrote"),
+        ("revoked = []", "revoked = []\ngeneration = []", "expected a generation of keys, got none"),
+        ("revoked = []", 'revoked = ["x"]', "expected what borechain pki wrote"),
+        ('rig = "rig-1"', "", "expected what borechain pki wrote"),
+        ('secret = "', 'secret = "00', "expected what borechain pki wrote"),
+        ("number = 1", 'number = "one"', "expected what borechain pki wrote"),
+    ],
+)
+def test_a_secret_that_was_changed_by_hand_is_refused_in_a_line(folder: Path, old: str, new: str, told: str) -> None:
+    path = folder / rig_keys.SECRET_FILE
+    text = path.read_text(encoding="utf-8")
+    if "generation = []" in new:
+        text = text[: text.index("[[generation]]")]
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(KeyFileError, match=told):
+        read_secret(folder)

@@ -200,7 +200,6 @@ class GauntletRig:
         """Give everything power and a working disk; the crew answers what stands."""
         self.repaired = True
         self.world.depth_hidden, self.world.depth_error = False, 0.0
-        self.world.forget()
         for address in EVERYBODY:
             self._disks[address].refusal, self._disks[address].writes_left = 0, -1
             self.thaw(address)

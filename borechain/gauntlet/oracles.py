@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sqlite3
 from collections.abc import Collection, Iterator
+from functools import partial
 from typing import Any
 
 import msgpack
@@ -54,6 +55,7 @@ class Observer:
         self._kept: tuple[bytes, set[tuple[int, int, str]]] = (b"", set())
         self._keeper: object = None  # the ground station's process that has written it
         self._reader = sqlite3.connect(":memory:")
+        self._reader.text_factory = partial(str, encoding="utf-8", errors="replace")  # what rots is no text
         self.found: list[str] = []
         rig.channel.listeners.append(self.on_frame)
         rig.before_cut.append(self._see_alarms)  # what the crew has seen does not go with the power

@@ -81,6 +81,7 @@ def _one_window(rig: GauntletRig, observer: Observer, number: int, begin: float)
         rig.advance(step.at, observer.look)
         step.act(rig)
     rig.repair()
+    rig.world.forget()
     rig.advance(begin + WINDOW_S, observer.look)
 
 

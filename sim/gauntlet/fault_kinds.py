@@ -114,8 +114,8 @@ KINDS: tuple[FaultKind, ...] = (
     ),
     FaultKind(
         "database-rots",
-        "single bits of messages in the database change",
-        power.power_cut([BASE], power.rot_messages),
+        "single bits of messages, stands, joints and told values in the database change",
+        power.power_cut([BASE], power.rot_rows),
         LOST_DATABASE,
     ),
 )
@@ -145,7 +145,7 @@ ANSWERS: dict[str, str] = {
     "same-number": "numbers of two series are kept apart by their content",
     "database-deleted": "the string is learnt anew; the tubes are asked for what is missing",
     "database-old": "the tubes are asked for the numbers that the backup lacks",
-    "database-rots": "damage is found by the content's hash; the tubes are asked for what is damaged",
+    "database-rots": "damage is found by each row's hash; the tubes are asked for messages, the rest is told",
     "clock-jumps": "the exchange of time finds it; the yaw is taken anew where it matters",
     "clock-drifts": "the clock filter follows",
     "loss": "frames are repeated",

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import math
 import sqlite3
-from collections.abc import Callable, Iterable
+import struct
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -14,7 +16,13 @@ from telemetry.messages import BASE, ENCODER
 
 Handle = Callable[[Faulty, int, np.random.Generator], None]
 REFUSALS = (errno.ENOSPC, errno.EROFS)
-ROTTEN = 4  # messages of a database that are damaged at once, at most
+ROTTEN = 4  # rows of a table of a database that are damaged at once, at most
+ROTTING = {  # columns of the database in which bits change, by table
+    "messages": ("payload", "payload", "content"),
+    "stands": ("begun_at", "ended_at", "md"),
+    "joints": ("angle", "var"),
+    "setup": ("content",),
+}
 
 
 def keep_disk(rig: Faulty, address: int, random: np.random.Generator) -> None:
@@ -123,19 +131,40 @@ def restore_backup(rig: Faulty, address: int, random: np.random.Generator) -> No
         disk.replace("ground.sqlite", backup)
 
 
-def rot_messages(rig: Faulty, address: int, random: np.random.Generator) -> None:
-    """Change a bit of the payload of some messages of the database; one at least, where it holds any."""
+def rot_rows(rig: Faulty, address: int, random: np.random.Generator) -> None:
+    """Change a bit of some rows of the database, one at least of each table that holds any."""
     disk = rig.disk(address)
     with contextlib.closing(sqlite3.connect(":memory:")) as database:
         for name, image in disk.held("ground.sqlite").items():
             database.deserialize(image)
-            rows = database.execute("SELECT id, payload FROM messages ORDER BY id").fetchall()
-            for row in random.permutation(len(rows))[: int(random.integers(1, ROTTEN + 1))]:
-                number, payload = rows[row][0], bytearray(rows[row][1])
-                payload[int(random.integers(len(payload)))] ^= 1 << int(random.integers(8))
-                database.execute("UPDATE messages SET payload = ? WHERE id = ?", (bytes(payload), number))
+            for table, columns in ROTTING.items():
+                _rot_table(database, table, columns, random)
             database.commit()
             disk.replace(name, database.serialize())
+
+
+def _rot_table(database: sqlite3.Connection, table: str, columns: Sequence[str], random: np.random.Generator) -> None:
+    """Change a bit in one column of some rows."""
+    numbers = [number for (number,) in database.execute(f"SELECT rowid FROM {table} ORDER BY rowid")]
+    chosen = random.permutation(len(numbers))[: int(random.integers(1, ROTTEN + 1))]
+    for number in (numbers[place] for place in chosen):
+        column = columns[int(random.integers(len(columns)))]
+        (before,) = database.execute(f"SELECT {column} FROM {table} WHERE rowid = ?", [number]).fetchone()
+        as_text = isinstance(before, str)
+        after = _rotten(before.encode() if as_text else before, random)
+        given = "CAST(? AS TEXT)" if as_text else "?"  # whatever its bytes are
+        database.execute(f"UPDATE {table} SET {column} = {given} WHERE rowid = ?", (after, number))
+
+
+def _rotten(before: bytes | float, random: np.random.Generator) -> bytes | float:
+    """Bytes or a number with one bit changed; a number stays one."""
+    rotten = bytearray(before if isinstance(before, bytes) else struct.pack("<d", before))
+    place, bit = int(random.integers(len(rotten))), int(random.integers(8))
+    rotten[place] ^= 1 << bit
+    if isinstance(before, bytes):
+        return bytes(rotten)
+    found: float = struct.unpack("<d", rotten)[0]
+    return found if math.isfinite(found) else -before
 
 
 def refused_disk(*addresses: int) -> Draw:

@@ -27,6 +27,7 @@ def test_a_minute_after_the_last_fault_all_is_well(first: int, count: int) -> No
     ("seed", "kinds"),
     [
         (9000006, ("database-deleted",)),  # each gap of the numbers waited for half a minute, one after the other
+        (9001, ("database-rots",)),  # the newest survey was damaged: its gap waited until the one before was given up
         (9000000, ("folders-swapped",)),  # each tube sent the other's messages for ever
         (
             9600000,

@@ -161,7 +161,10 @@ def test_a_lease_lapses_at_its_time_and_not_before() -> None:
 def test_what_is_barred_takes_no_order_and_tells_why(tmp_path: Path) -> None:
     rig = Rig(tmp_path)
     rig.run(5.0)
+    told_of: list[str] = []
+    rig.ground.listeners.append(told_of.extend)
     rig.ground.bar("rig rig-1: process 7 on laptop is its ground station", rig.now)
+    assert set(told_of) >= {"alarms", "status", "verdict"}  # at once: nothing is taken in that would tell it later
     with pytest.raises(LeaseError, match="process 7 on laptop"):
         rig.ground.operator.order("north", {"true_deg": "3", "sigma_deg": "1"}, "anna")
     told = {row["code"]: row["detail"] for row in rig.ground.operator.ask("alarms")["rig"]}

@@ -90,7 +90,7 @@ def test_a_message_of_which_any_bit_has_changed_is_not_read_and_is_taken_again(t
 def test_every_damaged_line_of_a_setup_and_of_alarms_counts_once(tmp_path: Path) -> None:
     Store(url(tmp_path)).close()
     with contextlib.closing(sqlite3.connect(tmp_path / "ground.sqlite")) as database:
-        database.executemany("insert into setup values (?, ?)", [(1, "{"), (2, "[]"), (3, "none")])
+        database.executemany("insert into setup (number, content) values (?, ?)", [(1, "{"), (2, "[]"), (3, "none")])
         database.executemany("insert into alarms values (?, ?)", [(1, "{"), (2, "none")])
         database.commit()
     with contextlib.closing(Store(url(tmp_path))) as store:

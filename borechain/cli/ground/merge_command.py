@@ -32,7 +32,7 @@ def merge(first: Path, second: Path, into: Path) -> None:
 
     done = merge_databases(first, second, into)
     if done.damaged:
-        print_notice(f"{done.damaged} messages are damaged and were left out; the tubes are asked for them again")
+        print_notice(f"{done.damaged} rows are damaged and were left out; the tubes are asked for lost messages again")
     if done.twice:
         named = ", ".join(f"number {number} of tube {tube}" for tube, number in done.twice[:SHOWN])
         told = f"{len(done.twice)} numbers have two contents, both are kept: {named}"

@@ -97,7 +97,7 @@ KINDS: tuple[AlarmKind, ...] = (
     AlarmKind("depth_contradicts", BAD, "the depth does not fit the tubes in the hole"),
     AlarmKind("disk", BAD, "the ground station's database refuses; nothing is acknowledged until it takes"),
     AlarmKind("lease", BAD, "it is not sure that this is still the ground station of the rig: it takes in nothing"),
-    AlarmKind("database", BAD, "messages in the database are damaged; they are asked for again"),
+    AlarmKind("database", BAD, "the database is damaged: messages are asked for again, tell again what was told"),
     AlarmKind("queue", DEGRADED, "a queue of the ground station was full and dropped something"),
     AlarmKind("bad_input", NOTICE, "bytes came that are no message of ours; they were dropped"),
     AlarmKind("wrong_password", NOTICE, "a wrong password was tried on the page; the detail says how often"),

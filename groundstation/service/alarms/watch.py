@@ -14,6 +14,7 @@ from groundstation.service.string.depth import CONTRADICTION
 from groundstation.service.string.idle_turning import IdleTurning
 from groundstation.service.string.known_string import KnownString
 from groundstation.service.string.message_numbers import Range
+from groundstation.service.string.number_growth import NumberGrowth
 from groundstation.survey.fusion.joint_angles import Pair, RestingYaw
 from groundstation.survey.fusion.shared_scale import shared_scale
 from groundstation.survey.fusion.survey_trust import trust_of
@@ -42,7 +43,6 @@ class Gap:
 
     numbers: Range
     found_at: float  # s, own clock
-    newest: int  # number that the tube had given out by then
     asked_at: float = -math.inf
     asked: int = 0
     complete_from: int = 0  # number from which on the tube has kept its surveys
@@ -69,6 +69,7 @@ class Watch:
         self._refused_in_a_row = 0
         self._contradictions = 0
         self._gaps: dict[int, Gap] = {}
+        self._growth = NumberGrowth()
         self._cross_check = EncoderCrossCheck()
         self._idle_turning = IdleTurning()
         self._told_unplaced: set[int] = set()  # tubes
@@ -212,15 +213,14 @@ class Watch:
             self._alarms.alert("joint", subject_of(change.pair), f"{what}; see the command accept_joints")
 
     def _gap_of(self, tube: int, now: float) -> Gap | None:
+        self._growth.note(tube, self._numbers.newest(tube), now)
         numbers, known = self._numbers.gap(tube), self._gaps.get(tube)
         if numbers is None:
             self._gaps.pop(tube, None)
             self._alarms.clear("numbers_missing", f"tube {tube}")
             return None
         if known is None or known.numbers[0] != numbers[0]:
-            # what was given out when the one before was found is missing for as long
-            since = known.found_at if known is not None and numbers[1] <= known.newest else now
-            known = self._gaps[tube] = Gap(numbers, since, self._numbers.newest(tube))
+            known = self._gaps[tube] = Gap(numbers, self._growth.given_out_at(tube, numbers[1], now))
         known.numbers = numbers
         if now >= known.found_at + GAP_AFTER:
             self._alarms.hold("numbers_missing", f"tube {tube}", f"numbers {numbers[0]} to {numbers[1]}")

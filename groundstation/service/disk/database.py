@@ -16,7 +16,17 @@ from typing import Any, Final
 import sqlalchemy as sa
 
 from groundstation.errors import StoreError
-from groundstation.service.disk.database_tables import ADD_META, ALL_META, DROP_META, META, METADATA, READABLE, SCHEMA
+from groundstation.service.disk.database_tables import (
+    ADD_META,
+    ALL_META,
+    DIGESTED,
+    DROP_META,
+    META,
+    METADATA,
+    READABLE,
+    SCHEMA,
+)
+from groundstation.service.disk.row_digest import DIGEST
 from telemetry.runtime.disk import MACHINE, Disk
 
 CACHE_KB = 256  # of pages that a connection keeps: rows come at the end, and the usual 2 MB fill within an hour
@@ -52,6 +62,7 @@ class Database:
         self.refusal = ""
         self.boots = 0
         self._tables: set[str] = set()
+        self._undigested: set[str] = set()  # tables of before without hashes, in a database that cannot be written
         try:
             with self._refusing("; choose a writable --folder or another database"):
                 if self._file is not None:
@@ -65,6 +76,13 @@ class Database:
     def _has(self, table: sa.Table) -> bool:
         """Whether there is a table; a database of before that cannot be written lacks the later ones."""
         return table.name in self._tables
+
+    def _known_columns(self, statement: sa.Select[Any]) -> sa.Select[Any]:
+        """A selection without the hashes where a database of before lacks them."""
+        columns = list(statement.selected_columns)
+        if columns[0].table.name not in self._undigested:
+            return statement
+        return statement.with_only_columns(*(column for column in columns if column.name != DIGEST))
 
     def close(self) -> None:
         """Close every connection."""
@@ -133,16 +151,34 @@ class Database:
             self._engine.dispose()  # the connection that only looked is not durable
             sa.event.listen(self._engine, "connect", _make_durable)
         self._tables = set(tables)
+        self._undigested = {table.name for table in DIGESTED if table.name in tables and not self._is_digested(table)}
         try:
             with self._refusing():
                 if lacking := [table for table in METADATA.sorted_tables if table.name not in tables]:
                     METADATA.create_all(self._engine, lacking)
                 self._tables.update(METADATA.tables)
+                self._add_digests()
                 self._count_start()
         except StoreError as error:
             if not tables:
                 raise
             self.refusal = str(error)
+
+    def _is_digested(self, table: sa.Table) -> bool:
+        """Whether a table has room for hashes."""
+        try:
+            with self._engine.connect() as connection:
+                connection.execute(sa.select(table.c[DIGEST]).limit(0))
+        except (sa.exc.OperationalError, sa.exc.ProgrammingError):
+            return False
+        return True
+
+    def _add_digests(self) -> None:
+        """Give the tables of before room for hashes; their rows have none."""
+        with self._engine.begin() as connection:
+            for name in sorted(self._undigested):
+                connection.execute(sa.text(f"ALTER TABLE {name} ADD COLUMN {DIGEST} VARCHAR(32)"))
+        self._undigested.clear()
 
     def _count_start(self) -> None:
         boots = int(self._meta().get("boots", "0")) + 1
@@ -171,7 +207,10 @@ def _engine_of_file(address: sa.URL, disk: Disk) -> sa.Engine:
     file, dialect = Path(address.database or ""), _sqlite_dialect()
 
     def connect() -> Any:
-        return disk.connect(file)
+        connection = disk.connect(file)
+        # a text of which a bit has changed is damaged, and refuses no other
+        connection.text_factory = functools.partial(str, encoding="utf-8", errors="replace")
+        return connection
 
     pool = sa.QueuePool(connect, dialect=dialect)
     return sa.Engine(pool, dialect, address, execution_options={"compiled_cache": COMPILED})

@@ -10,6 +10,13 @@ from sqlalchemy.dialects import sqlite
 SCHEMA = 5
 READABLE = (2, 3, 4, 5)  # schemas; what a later one has more is made when it is opened
 METADATA = sa.MetaData()
+
+
+def digest_column() -> sa.Column[str]:
+    """Hash of the other columns of a row; none in a row that a version wrote which knows of no hashes."""
+    return sa.Column("digest", sa.String(32))
+
+
 META = sa.Table(
     "meta",
     METADATA,
@@ -43,14 +50,18 @@ STANDS = sa.Table(
     sa.Column("begun_at", sa.Float, primary_key=True),
     sa.Column("ended_at", sa.Float, nullable=False),
     sa.Column("md", sa.Float, nullable=False),
+    digest_column(),
 )
 ALL_STANDS = sa.select(STANDS).order_by(STANDS.c.epoch, STANDS.c.begun_at)
 ADD_STAND = sa.insert(STANDS)
-DROP_OVERLAPS = sa.delete(STANDS).where(
-    STANDS.c.epoch == sa.bindparam("its_epoch"),
+OVERLAPS = sa.and_(
     STANDS.c.begun_at <= sa.bindparam("its_end"),
     STANDS.c.ended_at >= sa.bindparam("its_begin"),
     STANDS.c.md == sa.bindparam("its_md"),
+)
+DROP_OVERLAPS = sa.delete(STANDS).where(
+    STANDS.c.epoch == sa.bindparam("its_epoch"),
+    sa.or_(OVERLAPS, STANDS.c.begun_at == sa.bindparam("its_begin")),  # of another depth, it is damaged
 )
 STRING = sa.Table(
     "string",
@@ -80,6 +91,7 @@ JOINTS = sa.Table(
     sa.Column("lower", sa.Integer, primary_key=True, autoincrement=False),
     sa.Column("angle", sa.Float, nullable=False),
     sa.Column("var", sa.Float, nullable=False),
+    digest_column(),
 )
 ALL_JOINTS = sa.select(JOINTS)
 ALARMS = sa.Table(
@@ -94,9 +106,12 @@ SETUP = sa.Table(
     METADATA,
     sa.Column("number", sa.Integer, primary_key=True, autoincrement=False),
     sa.Column("content", sa.Text, nullable=False),
+    digest_column(),
 )
 ALL_SETUP, ADD_SETUP = sa.select(SETUP).order_by(SETUP.c.number), sa.insert(SETUP)
+DROP_SETUP = sa.delete(SETUP).where(SETUP.c.number == sa.bindparam("its_number"))
 DROP_ALARM, ADD_ALARM = sa.delete(ALARMS).where(ALARMS.c.number == sa.bindparam("its_number")), sa.insert(ALARMS)
+DIGESTED = (STANDS, JOINTS, SETUP)
 MOMENTS = sa.Table(
     "moments",
     METADATA,

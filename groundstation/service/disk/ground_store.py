@@ -38,6 +38,7 @@ from groundstation.service.disk.database_tables import (
     DROP_ALARM,
     DROP_MOMENT,
     DROP_OVERLAPS,
+    DROP_SETUP,
     FIND,
     JOINTS,
     MOMENT_NUMBERS,
@@ -51,6 +52,7 @@ from groundstation.service.disk.database_tables import (
     add_new,
 )
 from groundstation.service.disk.moment_record import DamagedMomentError, moment_of_bytes, moment_to_bytes
+from groundstation.service.disk.row_digest import add_digest, as_read, is_sound
 from groundstation.service.hole.history import Moment
 from groundstation.service.setup.told_value import DamagedSetupError, ToldValue, told_of_text, told_to_text
 from groundstation.service.string.depth import NEVER, DepthDoubt, Instant
@@ -71,7 +73,7 @@ class Store(Database):
 
     Attributes
     ----------
-    damaged : messages that could not be read
+    damaged : messages and rows that could not be read, or are not what was written
     """
 
     def __init__(self, url: str, disk: Disk = MACHINE) -> None:
@@ -120,10 +122,11 @@ class Store(Database):
     def keep_stand(self, stand: Stand) -> None:
         """Store that the bit stood, in the place of what it overlaps."""
         with self._writing() as connection:
-            its = {"its_epoch": stand.epoch, "its_begin": stand.begun_at, "its_end": stand.ended_at, "its_md": stand.md}
+            begun_at, ended_at, md = map(as_read, (stand.begun_at, stand.ended_at, stand.md))
+            its = {"its_epoch": stand.epoch, "its_begin": begun_at, "its_end": ended_at, "its_md": md}
             connection.execute(DROP_OVERLAPS, its)
-            row = {"epoch": stand.epoch, "begun_at": stand.begun_at, "ended_at": stand.ended_at, "md": stand.md}
-            connection.execute(ADD_STAND, row)
+            row = {"epoch": stand.epoch, "begun_at": begun_at, "ended_at": ended_at, "md": md}
+            connection.execute(ADD_STAND, add_digest(row))
 
     def messages(self) -> Iterator[Stored[Kept]]:
         """Everything stored, in the order of arrival; what is damaged is passed over and counted."""
@@ -136,9 +139,9 @@ class Store(Database):
                     self.damaged += 1
 
     def stands(self) -> list[Stand]:
-        """Where the bit stood, in the order of time."""
-        with self._refusing(), self._engine.connect() as connection:
-            return [Stand(row.epoch, row.begun_at, row.ended_at, row.md) for row in connection.execute(ALL_STANDS)]
+        """Where the bit stood, in the order of time; what is damaged is passed over and counted."""
+        rows = self._sound_rows(ALL_STANDS)
+        return [Stand(row["epoch"], row["begun_at"], row["ended_at"], row["md"]) for row in rows]
 
     def keep_epoch(self, epoch: int) -> None:
         """Store the epoch of rig time."""
@@ -174,7 +177,7 @@ class Store(Database):
     def keep_joints(self, joints: Mapping[Pair, JointAngle]) -> None:
         """Store the angles of the joints, in the place of those stored before."""
         rows = [
-            {"upper": upper, "lower": lower, "angle": joint.angle, "var": joint.var}
+            add_digest({"upper": upper, "lower": lower, "angle": as_read(joint.angle), "var": as_read(joint.var)})
             for (upper, lower), joint in joints.items()
         ]
         with self._writing() as connection:
@@ -183,11 +186,9 @@ class Store(Database):
                 connection.execute(sa.insert(JOINTS), rows)
 
     def joints(self) -> dict[Pair, JointAngle]:
-        """Angles of the joints."""
-        if not self._has(JOINTS):
-            return {}
-        with self._refusing(), self._engine.connect() as connection:
-            return {(row.upper, row.lower): JointAngle(row.angle, row.var) for row in connection.execute(ALL_JOINTS)}
+        """Angles of the joints; what is damaged is passed over and counted."""
+        rows = self._sound_rows(ALL_JOINTS) if self._has(JOINTS) else []
+        return {(row["upper"], row["lower"]): JointAngle(row["angle"], row["var"]) for row in rows}
 
     def epoch(self) -> int:
         """Epoch of rig time that was known last, 0 for none."""
@@ -258,7 +259,7 @@ class Store(Database):
         return found
 
     def keep_told(self, told: ToldValue) -> None:
-        """Store what was told of the setup, before it counts.
+        """Store what was told of the setup, before it counts; in the place of one that is damaged.
 
         Raises
         ------
@@ -266,21 +267,26 @@ class Store(Database):
             When the disk refuses.
         """
         with self._writing() as connection:
-            connection.execute(ADD_SETUP, {"number": told.number, "content": told_to_text(told)})
+            connection.execute(DROP_SETUP, {"its_number": told.number})
+            connection.execute(ADD_SETUP, add_digest({"number": told.number, "content": told_to_text(told)}))
 
     def told(self) -> list[ToldValue]:
         """What was told of the setup, the oldest first; what is damaged is passed over and counted."""
-        if not self._has(SETUP):
-            return []
-        with self._refusing(), self._engine.connect() as connection:
-            rows = connection.execute(ALL_SETUP).all()
         found = []
-        for row in rows:
+        for row in self._sound_rows(ALL_SETUP) if self._has(SETUP) else []:
             try:
-                found.append(told_of_text(row.content))
+                found.append(told_of_text(row["content"]))
             except DamagedSetupError:
                 self.damaged += 1
         return found
+
+    def _sound_rows(self, statement: sa.Select[Any]) -> list[dict[str, Any]]:
+        """Rows whose hash fits; the others are counted."""
+        with self._refusing(), self._engine.connect() as connection:
+            rows = [dict(row) for row in connection.execute(self._known_columns(statement)).mappings()]
+        sound = [row for row in rows if is_sound(row)]
+        self.damaged += len(rows) - len(sound)
+        return sound
 
     def keep_moments(self, basis: str, moments: Sequence[Moment], dropped: Iterable[int] = ()) -> None:
         """Store what was known at the end of stops, by a basis, in the place of what was kept of them before.

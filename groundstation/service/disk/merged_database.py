@@ -102,7 +102,8 @@ def _merge(merged: Store, other: Store) -> DatabaseMerge:
     merged.add_messages(fresh)
     if placed:
         merged.place_messages(placed)
-    stands = [stand for stand in other.stands() if stand not in merged.stands()]
+    known_stands = merged.stands()
+    stands = [stand for stand in other.stands() if stand not in known_stands]
     for stand in stands:
         merged.keep_stand(stand)
     if other.epoch() > merged.epoch():

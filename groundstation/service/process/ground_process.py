@@ -277,7 +277,7 @@ class GroundProcess(Process):
         alarms, refusal = self.model.rig_alarms, self.store.refusal
         self._time.look()
         alarms.hold("disk", "database", refusal)
-        alarms.hold("database", "database", f"{self.store.damaged} messages" if self.store.damaged else "")
+        alarms.hold("database", "database", f"{self.store.damaged} rows" if self.store.damaged else "")
         dropped = self.endpoint.dropped
         alarms.hold("queue", "ground station", f"{dropped} dropped" if dropped else "")
         self._seal_watch.look(now)
