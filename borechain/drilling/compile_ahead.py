@@ -23,7 +23,12 @@ PARTS_OF: Final[Mapping[str, Sequence[str]]] = {
     "fixed": ("step", "surveys", "adjustment", "integers"),
     "chip": ("step", "surveys", "adjustment", "integers"),
 }  # by kernel, see ``kernel_parts``
-ABOUT: Final[Mapping[str, int]] = {"step": 305, "surveys": 270, "adjustment": 60, "integers": 500}  # functions that a part compiles
+ABOUT: Final[Mapping[str, int]] = {
+    "step": 305,
+    "surveys": 270,
+    "adjustment": 60,
+    "integers": 500,
+}  # functions that a part compiles
 
 ShowCompiling = Callable[[int], AbstractContextManager[Callable[[int], None]]]  # of how many; then how many are done
 

@@ -91,10 +91,10 @@ class TubeFlash:
 
 
 def window_begin(ended: float, now: float) -> float:
-    """Where the window of a reading begins (s) that is taken ``now``, after one that ``ended``: nothing is lost between.
+    """Where the window of a reading begins (s) that is taken ``now``, after one that ``ended``.
 
-    A machine that is late reads late, and a sensor has gone on meanwhile. Where a whole cycle is missing the window is
-    that of a cycle, as the chip takes it.
+    Nothing is lost between: a machine that is busy reads late, and a sensor has gone on meanwhile. Where a whole cycle
+    is missing the window is that of a cycle, as the chip takes it.
     """
     return ended if now - ended < 1.5 * PERIOD else now - PERIOD
 
