@@ -93,7 +93,10 @@ MACHINES = {
 
 
 def run_on_chip(target: str, program: Path, folder: Path) -> subprocess.CompletedProcess[str]:
-    """What the program says in QEMU; ``folder`` has its calls.bin. One that is ended from outside tells how far it was."""
+    """What the program says in QEMU; ``folder`` has its calls.bin.
+
+    Of one that a signal has ended it is told how far it was.
+    """
     program_name, *machine = MACHINES[target]
     quiet = ("-nographic", "-monitor", "none", "-serial", "null")
     hosted = ("-semihosting-config", "enable=on,target=native")
