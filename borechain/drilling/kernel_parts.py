@@ -38,18 +38,23 @@ def compile_surveys() -> None:
 
 
 def warm_surveys() -> None:
-    """What the ground station makes of surveys."""
-    from groundstation.survey.adjustment.warm_adjustment import warm_adjustment
+    """What the ground station makes of surveys before it adjusts the hole."""
     from groundstation.survey.path.kernels import curvature_filter, frame_along, mixture_chances
     from groundstation.survey.well.kernels import position_errors
 
     for kernels in (position_errors, frame_along, curvature_filter, mixture_chances):
         kernels.warm_up()
-    warm_adjustment()
     from groundstation.survey.path.developed_directions import develop_directions
 
     part = np.tile([0.0, 0.0, 1.0, 0.0], (2, 1))[:, :3]  # of a wider table, as those of stations are
     develop_directions(part, np.zeros((2, 4, 4))[:, :3, :3])
+
+
+def compile_adjustment() -> None:
+    """The adjustment of the hole: as much as the other two, so that two cores end together."""
+    from groundstation.survey.adjustment.warm_adjustment import warm_adjustment
+
+    warm_adjustment()
 
 
 def compile_integers() -> None:
@@ -64,6 +69,7 @@ def compile_integers() -> None:
 PARTS: Final[Mapping[str, Callable[[], None]]] = {
     "step": compile_step,
     "surveys": compile_surveys,
+    "adjustment": compile_adjustment,
     "integers": compile_integers,
 }
 

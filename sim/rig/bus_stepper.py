@@ -22,10 +22,11 @@ from telemetry.media.zenoh_bus import Publisher, ZenohBus
 from telemetry.messages import BASE, Side, address_name
 from telemetry.runtime.marked_frames import UNMARKED, MarkedFrames, mark_frame
 from telemetry.runtime.step_stream import StepListener, StepStream
-from telemetry.runtime.stepped import Due, DueEvent, pack_step, unpack_done
+from telemetry.runtime.stepped import Done, Due, DueEvent, pack_step, unpack_done
 from telemetry.unwritten import Content
 
 FRAME_TICK = 0.05  # wall s
+SIDES = tuple(Side)  # read at every step: an enumeration takes longer
 Arrival = tuple[str, int, int, bytes]  # what, address, side or whether it lives, payload
 MediumOf = Callable[[int, Side], str | None]
 
@@ -71,7 +72,7 @@ class Seat:
         self.step_number = 0
         self.tx = (MarkedFrames(), MarkedFrames())
         self.foreign_there = 0  # frames that the process has dropped
-        self.done: deque[bytes] = deque()
+        self.done: deque[Done] = deque()
         self.stream: StepStream | None = None
         self._key = keys.STEP.format(rig=rig, process=address_name(address))
         self._bus = bus
@@ -233,20 +234,15 @@ class BusStepper:
 
     def _answer(self, seat: Seat) -> Answer | None:
         while seat.done:
-            try:
-                done = unpack_done(seat.done[0])
-            except DecodeError:
-                done = None
-            if done is None or done.number != seat.step_number:
-                self._junk += done is None
+            done = seat.done[0]
+            if done.number != seat.step_number:
                 seat.done.popleft()
                 continue
-            marks = {side: [s.mark for s in done.sent if s.side == side] for side in Side}
-            if not all(seat.tx[side].has_all(marks[side]) for side in Side):
+            if not all(seat.tx[side].has_all([s.mark for s in done.sent if s.side == side]) for side in SIDES):
                 return None
             seat.done.popleft()
             seat.foreign_there = done.foreign
-            taken = {side: seat.tx[side].take(is_marked=side not in seat.far.ports) for side in Side}
+            taken = [seat.tx[side].take(is_marked=side not in seat.far.ports) for side in SIDES]
             return Answer([(s._replace(mark=UNMARKED), taken[s.side].popleft()) for s in done.sent], done.wake_at)
         return None
 
@@ -291,9 +287,15 @@ class BusStepper:
                 self._junk += 1
         elif seat is not None and seat.alive:
             if what == "done":
-                seat.done.append(payload)
+                self._take_answer(seat, payload)
             else:
                 seat.tx[side].add(payload)
+
+    def _take_answer(self, seat: Seat, payload: bytes) -> None:
+        try:
+            seat.done.append(unpack_done(payload))
+        except DecodeError:
+            self._junk += 1
 
     def _seat_of(self, address: int) -> Seat:
         seat = self._seats.get(address)

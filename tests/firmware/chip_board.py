@@ -90,6 +90,20 @@ class TubeFlash:
             return file.read(4) == bytes(4)
 
 
+def window_begin(ended: float, now: float) -> float:
+    """Where the window of a reading begins (s) that is taken ``now``, after one that ``ended``.
+
+    Nothing is lost between: a machine that is busy reads late, and a sensor has gone on meanwhile. Where a whole cycle
+    is missing the window is that of a cycle, as the chip takes it.
+    """
+    return ended if now - ended < 1.5 * PERIOD else now - PERIOD
+
+
+def next_due(due: float, now: float) -> float:
+    """When (s) the cycle after one that was due and read ``now`` is read: half a cycle later at the least."""
+    return due + PERIOD * (1 + round(max(now - due, 0.0) / PERIOD))
+
+
 class SensorLine(threading.Thread):
     """What the chip's sensor measures, a cycle at a time, from a recording by the clock of this machine."""
 
@@ -102,17 +116,18 @@ class SensorLine(threading.Thread):
 
     def run(self) -> None:
         """Write a cycle's mean as it ends, until the line is gone or it is stopped."""
-        due = time.monotonic() + PERIOD
+        ended = time.monotonic()
+        due = ended + PERIOD
         with contextlib.suppress(OSError), self._line.open("wb", buffering=0) as line:
             tty.setraw(line)
             while not self._ends.wait(max(due - time.monotonic(), 0.0)):
                 now = time.monotonic()
-                sample = self._imu.read(now - PERIOD, now)
+                sample = self._imu.read(window_begin(ended, now), now)
+                ended, due = now, next_due(due, now)
                 numbers = (*sample.rate, *(force / self._gravity for force in sample.force), sample.temperature)
                 scaled = [round(x * scale) for x, scale in zip(numbers, READING_SCALES[:7].tolist(), strict=True)]
                 body = struct.pack("<7q", *scaled)
                 line.write(MARK + body + bytes([sum(body) & 0xFF]))
-                due += PERIOD
 
     def stop(self) -> None:
         """End it."""

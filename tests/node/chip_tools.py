@@ -3,6 +3,7 @@
 import itertools
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -92,11 +93,18 @@ MACHINES = {
 
 
 def run_on_chip(target: str, program: Path, folder: Path) -> subprocess.CompletedProcess[str]:
-    """What the program says in QEMU; ``folder`` has its calls.bin."""
+    """What the program says in QEMU; ``folder`` has its calls.bin.
+
+    Of one that a signal has ended it is told how far it was.
+    """
     program_name, *machine = MACHINES[target]
     quiet = ("-nographic", "-monitor", "none", "-serial", "null")
     hosted = ("-semihosting-config", "enable=on,target=native")
-    return run_program(program_name, *machine, *quiet, *hosted, "-kernel", program, folder=folder)
+    done = run_program(program_name, *machine, *quiet, *hosted, "-kernel", program, folder=folder)
+    if done.returncode < 0:
+        ended = signal.Signals(-done.returncode).name
+        raise AssertionError(f"{target}: {program_name} was ended by {ended}; until then {said_numbers(done.stdout)}")
+    return done
 
 
 def layout_of_one() -> Layout:

@@ -83,8 +83,17 @@ class ProjectedEnd:
         return self.foreseen.chance_within(radius) if self.comes_there else 0.0
 
     def distance_of(self, chance: float) -> float:
-        """Distance (m) from the axis within which it ends by a chance."""
-        return self.foreseen.radius_of(chance, NOWHERE) if self.comes_there else math.inf
+        """Distance (m) from the axis within which it ends by a chance; sought once, a verdict asks again and again."""
+        if not self.comes_there:
+            return math.inf
+        if chance not in self._distances:
+            self._distances[chance] = self.foreseen.radius_of(chance, NOWHERE)
+        return self._distances[chance]
+
+    @cached_property
+    def _distances(self) -> dict[float, float]:
+        """Distances (m) that were asked for, by their chance."""
+        return {}
 
     @cached_property
     def cone(self) -> list[ConePoint]:

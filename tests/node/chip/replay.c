@@ -14,6 +14,7 @@ enum { NODE, SETTINGS, PARAMETERS, STEP, AIDING, LAST, KEEP, PATCH, BACK };
 #define SLOTS 4
 #define WORDS (sizeof(struct borechain_node) / 4)
 #define STACK_WORDS 2048
+#define TOLD_EVERY 10000 /* calls, after which it says how far it is: one that is ended has said something */
 
 static struct borechain_node nodes[SLOTS], kept;
 static struct borechain_settings settings[SLOTS];
@@ -201,6 +202,10 @@ int main(int count, char **names)
                 run(call_aiding, 1);
             }
             calls++;
+            if (calls % TOLD_EVERY == 0) {
+                printf("calls %ld wrong %ld\n", calls, wrong);
+                fflush(stdout);
+            }
             if (undefined) { /* in Python as in C */
                 printf("undefined %ld\n", calls);
                 meaningless++;

@@ -42,7 +42,7 @@ def replayed(target: str, folder: Path, *worlds: Callable[[], object]) -> dict[s
     made = record_calls(folder / "calls.bin", *worlds)
     done = run_on_chip(target, compile_for_chip(folder, target), folder)
     found = said_numbers(done.stdout)
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.returncode == 0, (done.returncode, done.stdout, done.stderr)
     assert (found["calls"], found["wrong"]) == (made, 0)
     return found
 
@@ -63,6 +63,9 @@ def test_a_step_of_one_imu_is_short(target: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.statistical
+@pytest.mark.timeout(
+    3600
+)  # 110 s of processor time for the calls, up to 175 s for an emulator: minutes on a busy machine
 @pytest.mark.parametrize("target", [on(target) for target in MACHINES])
 def test_chips_give_the_same_on_a_hundred_thousand_calls(target: str, tmp_path: Path) -> None:
     assert replayed(target, tmp_path, *every_world(14_000))["calls"] > 100_000
