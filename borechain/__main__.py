@@ -61,7 +61,8 @@ COMMANDS = {
     ),
     "experiment": ("borechain.cli.experiment.experiment", "experiment", "Rerun a published experiment beside ours."),
 }
-ONE_THREAD = ("ground", "bench")  # whose matrices are small: a second thread would wait most of the time
+# whose matrices are small: a second thread would wait most of the time
+ONE_THREAD = ("ground", "bench", "rig", "demo", "gauntlet")
 
 
 class LazyGroup(click.Group):
