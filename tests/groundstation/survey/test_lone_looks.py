@@ -7,13 +7,13 @@ import numpy.typing as npt
 import pytest
 from drawn_strings import DrawnString, draw_string
 
-from groundstation.survey.adjustment import adjust, lone_looks
+from groundstation.survey.adjustment import lone_looks
 from groundstation.survey.adjustment.adjust import adjust_hole
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.curvature_size import learnt_curvature
 from groundstation.survey.adjustment.equations import path_equations, string_departure, string_information
 from groundstation.survey.adjustment.looks import FurtherEffects
-from groundstation.survey.adjustment.normal_equations import linearise_all, solve_equations
+from groundstation.survey.adjustment.normal_equations import WIDE, linearise_all, solve_equations
 from groundstation.survey.adjustment.play import learnt_play
 from groundstation.survey.adjustment.sphere import carried_bases
 from groundstation.survey.adjustment.starting_point import first_start
@@ -80,7 +80,7 @@ def test_a_hole_comes_to_the_same_with_them_left_out(seed: int, whole: float, is
             begin = replace(start, is_learnt=is_learnt)
             found.append(adjust_hole(drawn.looks, drawn.string, drawn.path, start=begin))
     one, other = found
-    assert len(one.known) == len(other.known) == drawn.string.width >= adjust.WIDE
+    assert len(one.known) == len(other.known) == drawn.string.width >= WIDE
     directions, common = stds_of(other)
     apart = np.einsum("kai,ki->ka", other.bases, one.now.tangents - other.now.tangents)
     assert np.abs(apart / directions).max() < 1e-3
