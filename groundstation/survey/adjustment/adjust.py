@@ -19,8 +19,9 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.adjusted import Adjusted, Linearised
 from groundstation.survey.adjustment.equations import path_equations, string_departure, string_information
 from groundstation.survey.adjustment.linear_solution import LinearSolution
+from groundstation.survey.adjustment.lone_looks import LoneLooks, lone_looks
 from groundstation.survey.adjustment.looks import OF_TUBE, FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
-from groundstation.survey.adjustment.normal_equations import are_many, linearise_all, solve_again, solve_equations
+from groundstation.survey.adjustment.normal_equations import WIDE, are_many, linearise_all, solve_again, solve_equations
 from groundstation.survey.adjustment.sphere import carried_bases, step_about_vertical
 from groundstation.survey.adjustment.starting_point import first_start
 from groundstation.survey.adjustment.variance_learning import ITERATIONS, VarianceLearning
@@ -64,20 +65,40 @@ def adjust_hole(
     is_settled = now.is_learnt  # where it begins: so what is known of each unknown beside the others is no matter
     learning, turns, step = VarianceLearning(is_done=is_settled), poor_yaws(looks, len(path.md)), math.inf
     leading: LinearSolution | None = None  # whose equations lead on, where one of before does
+    alone = None if len(known) < WIDE or are_many(looks) else lone_looks(looks, string, known)
     for again in range(ITERATIONS + FURTHER):
         linear = linearise_all(looks, now, carried_bases(now.tangents), extra)
-        solution = _solved(looks, string, path, extra, known, now, linear, leading)
-        before, step = step, solution.decrement if is_settled else solution.step
+        if alone is None:
+            solution = _solved(looks, string, path, extra, known, now, linear, leading)
+            ended = _stepped(now, linear.bases, solution.states, solution.common, turns)
+            found = Adjusted(looks, string, path, extra, ended, linear, solution, known)
+        else:
+            found = _step_without(alone, looks, string, path, extra, known, now, linear, turns)
+        before, step = step, found.solution.decrement if is_settled else found.solution.step
         if not np.isfinite(step):
             raise np.linalg.LinAlgError("expected a step of the unknowns, got numbers that are none")
-        found = Adjusted(
-            looks, string, path, extra, _stepped(now, linear.bases, solution, turns), linear, solution, known
-        )
-        leading = solution if is_settled and are_many(looks) and step < NEARER * before else None
+        leading = found.solution if is_settled and are_many(looks) and step < NEARER * before else None
         now = learning.go_on(found, again, step)
-        if learning.is_done and step < SETTLED:
+        is_near = learning.is_done and step < SETTLED
+        if is_near and alone is None:
             break
+        if is_near or again >= ITERATIONS:
+            alone = None  # the last steps are of all unknowns
     return found
+
+
+def _step_without(
+    alone: LoneLooks, looks: Looks, string: StringPrior, path: PathPrior, extra: FurtherEffects, known: Array,
+    now: StartingPoint, linear: Linearised, turns: Truths,
+) -> Adjusted:  # fmt: skip
+    """A step by equations without bias and tilt of tubes that have looked once; these follow it."""
+    kept, (linear, gains) = known[np.ix_(alone.kept, alone.kept)], alone.put_into_weights(linear, now.tubes)
+    departure = string_departure(string, now)[alone.kept]
+    solution = solve_equations(looks, linear, path_equations(path, now, linear.bases), kept, departure, extra)
+    found = Adjusted(looks, string, path, extra, now, linear, solution, kept)
+    common = alone.whole_step(solution.common, gains, found.left, now.tubes)
+    ended = _stepped(now, linear.bases, solution.states, common, turns)
+    return replace(found, now=ended)
 
 
 def _solved(
@@ -99,18 +120,21 @@ def poor_yaws(looks: Looks, count: int) -> Truths:
     return np.asarray(is_seen & ~is_well)
 
 
-def _stepped(now: StartingPoint, bases: Array, solution: LinearSolution, turns: Truths) -> StartingPoint:
-    """Where the unknowns stand after a step, which turns some directions about the vertical."""
+def _stepped(now: StartingPoint, bases: Array, states: Array, common: Array, turns: Truths) -> StartingPoint:
+    """Where the unknowns stand after a step of states (s + 1, 4) and of what they have in common (p,).
+
+    It turns some directions about the vertical.
+    """
     size = now.tubes.size
     make_ups = slice(size + 1, size + 1 + len(now.make_ups))
     return StartingPoint(
-        step_about_vertical(now.tangents, bases, solution.states[:, :2], turns),
-        now.curvatures + solution.states[:, 2:],
-        now.tubes + solution.common[:size].reshape(-1, OF_TUBE),
-        now.make_ups + solution.common[make_ups],
-        now.gravity + float(solution.common[size]),
+        step_about_vertical(now.tangents, bases, states[:, :2], turns),
+        now.curvatures + states[:, 2:],
+        now.tubes + common[:size].reshape(-1, OF_TUBE),
+        now.make_ups + common[make_ups],
+        now.gravity + float(common[size]),
         now.play_var,
         now.curvature_var,
         now.leg_vars,
-        now.extra + solution.common[make_ups.stop :],
+        now.extra + common[make_ups.stop :],
     )

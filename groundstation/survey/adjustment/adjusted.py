@@ -25,14 +25,20 @@ Places = npt.NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True)
 class Linearised:
-    """Looks where the unknowns stood: see ``linearise_looks``; ``squares`` (n,) of their residuals before."""
+    """Looks where the unknowns stood: see ``linearise_looks``; ``squares`` (n,) of their residuals before.
+
+    ``tilts`` (n, 3, 2) is their change by the tilt of a tube, also where those unknowns are left out; ``places`` (m, 6)
+    and ``gravity_at`` are those of tubes and gravity among what stations have in common.
+    """
 
     bases: Array
     jacobians: Array
     weights: Array
     residuals: Array
     squares: Array
-    gravity_at: int  # place of gravity among what stations have in common, behind the tubes
+    tilts: Array
+    places: Places
+    gravity_at: int
 
 
 @dataclass(frozen=True)  # with a dictionary, for what is worked out once
@@ -66,7 +72,7 @@ class Adjusted:
 
     def without_looks(self) -> Adjusted:
         """Directions and their covariance alone: what is kept of looks (n,) where no look is asked about any more."""
-        of_looks = ("jacobians", "weights", "residuals", "squares")
+        of_looks = ("jacobians", "weights", "residuals", "squares", "tilts")
         none = {name: getattr(self.linear, name)[:0].copy() for name in of_looks}
         return replace(self, linear=replace(self.linear, **none))
 
@@ -117,7 +123,7 @@ class Adjusted:
     @cached_property
     def common_vars(self) -> Array:
         """Variances (p,) of what stations have in common."""
-        return np.asarray(np.einsum("pk,pk->p", self.common_root, self.common_root))
+        return self.solution.in_common.variances
 
     @cached_property
     def covs(self) -> Array:
@@ -144,8 +150,8 @@ class Adjusted:
     def _left_of(self, looks: Looks, jacobians: Array, residuals: Array, further: Array) -> Array:
         left = np.empty((len(looks), 3))
         take_step(
-            looks.station, looks.tube, looks.make_up, jacobians, residuals, further, self.linear.gravity_at,
-            self.solution.states, self.solution.common, left,
+            looks.station, looks.tube, looks.make_up, jacobians, residuals, further, self.linear.places,
+            self.linear.gravity_at, self.solution.states, self.solution.common, left,
         )  # fmt: skip
         return left
 

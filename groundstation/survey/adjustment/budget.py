@@ -74,7 +74,7 @@ def error_budget(found: Adjusted, weights: Array, causes: TurnCauses) -> list[Er
 
 def _spread(found: Adjusted, weights: Array) -> tuple[Array, Array]:
     """Covariance of states (s + 1, 4, r) and of what is in common (p, r) with the functionals."""
-    return found.cofactor(weights, np.zeros((len(found.common_cov), weights.shape[2])))
+    return found.cofactor(weights, np.zeros((len(found.known), weights.shape[2])))
 
 
 def _of_priors(found: Adjusted, states: Array, common: Array, causes: TurnCauses) -> list[ErrorShare]:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.kernels.observations import mirror_upper
 
 Array = npt.NDArray[np.float64]
-KEPT = ("factor", "cov", "root")  # of equations, whatever stands on their right side
+KEPT = ("factor", "cov", "root", "variances")  # of equations, whatever stands on their right side
 
 
 @dataclass(frozen=True)  # with a dictionary, for what is worked out once
@@ -60,6 +60,16 @@ class InCommon:
         from scipy.linalg import lapack
 
         return np.asarray(lapack.dtrtri(self.factor, lower=1)[0].T)
+
+    @cached_property
+    def variances(self) -> Array:
+        """Diagonal (p,) of the covariance, which need not be worked out for it."""
+        return np.asarray(np.einsum("pk,pk->p", self.root, self.root))
+
+    @property
+    def log_size(self) -> float:
+        """Logarithm of the determinant of the covariance."""
+        return -2.0 * float(np.sum(np.log(np.diag(self.factor))))
 
     def times_cov(self, columns: Array) -> Array:
         """Covariance times columns (p, r)."""
@@ -128,7 +138,7 @@ class LinearSolution:
     @property
     def step(self) -> float:
         """Largest step of an unknown in its standard deviations, at most as the equations know them; NaN if one is."""
-        of_common = np.max(np.abs(self.common) / np.sqrt(np.diag(self.cov)), initial=0.0)
+        of_common = np.max(np.abs(self.common) / np.sqrt(self.in_common.variances), initial=0.0)
         rigid = np.einsum("kab,kab->ka", self.diagonal, self.diagonal)  # of what is left of each block
         return float(np.maximum(of_common, np.max(np.abs(self.states) * np.sqrt(rigid))))
 

@@ -22,13 +22,14 @@ from groundstation.survey.adjustment.kernels.path_elimination import (
     substitute_path,
 )
 from groundstation.survey.adjustment.linear_solution import InCommon, LinearSolution
-from groundstation.survey.adjustment.looks import OF_TUBE, FurtherEffects, Looks, StartingPoint
+from groundstation.survey.adjustment.looks import OF_TUBE, TURN, FurtherEffects, Looks, StartingPoint
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
 MANY = 1500  # looks, from which on later steps go by the equations of the first, whose right sides alone are made anew
 WIDE = 150  # unknowns in common, from which on it is worth to leave out columns of tubes that are zero
 TOGETHER = 64  # stations whose squares are summed at once
+TILTS = slice(5, 7)  # of the unknowns of a look
 GROSS = 16.27  # chi-square of three beyond which a look counts less: one in a thousand
 
 
@@ -50,7 +51,8 @@ def linearise_all(looks: Looks, now: StartingPoint, bases: Array, extra: Further
     if len(now.extra):
         residuals -= extra.columns @ now.extra
     weigh_down(residuals, GROSS, weights, squares)
-    return Linearised(bases, jacobians, weights, residuals, squares, now.tubes.size)
+    places = np.arange(now.tubes.size).reshape(-1, OF_TUBE)
+    return Linearised(bases, jacobians, weights, residuals, squares, jacobians[:, :, TILTS], places, now.tubes.size)
 
 
 def solve_equations(
@@ -71,7 +73,7 @@ def solve_equations(
         wide = coupled.reshape(-1, coupled.shape[2])
         in_common -= wide.T @ wide
     else:
-        ends = tube_columns(looks, len(diagonal))
+        ends = tube_columns(looks, len(diagonal), linear.places)
         eliminate_few(diagonal, tied, coupled, ends, linear.gravity_at)
         take_squares(coupled, ends, linear.gravity_at, in_common)
     left = InCommon(in_common[:size, :size], in_common[:size, size])
@@ -83,13 +85,19 @@ def solve_equations(
     )
 
 
-def tube_columns(looks: Looks, count: int) -> Places:
-    """Columns (count,) of tubes from each on are zero at each station and below: no such tube has come there."""
+def tube_columns(looks: Looks, count: int, places: Places) -> Places:
+    """Columns (count,) of tubes from each on are zero at each station and below: no such tube has come there.
+
+    Parameters
+    ----------
+    places : (m, 6), columns of every tube
+    """
     tubes = int(looks.tube.max(initial=-1)) + 1
     is_there = np.zeros((count, tubes + 1), bool)  # from the highest tube down, and none
     is_there[:, tubes] = is_there[looks.station, tubes - 1 - looks.tube] = True
     highest = tubes - 1 - is_there.argmax(axis=1)
-    return np.asarray(OF_TUBE * (1 + np.maximum.accumulate(highest[::-1])[::-1]), np.intp)
+    ends = np.append(places[:, TURN] + 1, 0)  # of none
+    return np.asarray(ends[np.maximum.accumulate(highest[::-1])[::-1]], np.intp)
 
 
 def take_squares(coupled: Array, ends: Places, tail: int, in_common: Array) -> None:
@@ -154,7 +162,7 @@ def gather_equations(
     at_station = np.zeros((count, 2, 2))
     add_looks(
         looks.station, looks.tube, looks.make_up, linear.jacobians, linear.weights, linear.residuals, extra.columns,
-        linear.gravity_at, at_station, coupled, in_common,
+        linear.places, linear.gravity_at, at_station, coupled, in_common,
     )  # fmt: skip
     diagonal[:, :2, :2] += at_station
     coupled[:, :, size] += right

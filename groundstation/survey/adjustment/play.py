@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 PLAY_KNOWN_AS = 4.0  # looks that the play before them counts for
-TILTS = slice(5, 7)  # of the unknowns of a look
 LEAST, MOST = 1e-14, 0.03  # rad^2
 LEAST_SLOPE, MOST_SLOPE = -3.0, 0.8  # of what is found by what was tried, both in logarithms
 TOO_NEAR = 1e-6  # logarithms, between which a slope is not told
@@ -30,7 +29,7 @@ def learnt_play(found: Adjusted, before: float, known_as: float) -> float:
     before, known_as : rad^2, variance before the looks, and the number of looks that this counts for
     """
     var = found.now.play_var
-    tilts = found.linear.jacobians[:, :, TILTS]
+    tilts = found.linear.tilts
     weighed = found.linear.weights @ tilts
     pulled = np.einsum("kai,ka->ki", weighed, found.left).ravel()
     whole = float(np.einsum("kai,kai->", tilts, weighed))
@@ -50,7 +49,7 @@ def told_by_all(found: Adjusted, weights: Array) -> float:
     in_common = np.zeros((size + 1, size + 1))
     add_looks(
         looks.station, looks.tube, looks.make_up, linear.jacobians, weights, linear.residuals, found.extra.columns,
-        linear.gravity_at, own, coupled, in_common,
+        linear.places, linear.gravity_at, own, coupled, in_common,
     )  # fmt: skip
     both = own @ found.by_common[:, :2] + 2.0 * coupled[:, :, :size]
     # the covariance is R R^T: times B^T (N B + 2 C) its trace is that of (B R)^T (N B + 2 C) R

@@ -78,7 +78,7 @@ def measure_reliability(
     sizes : size that a blunder of a kind may have, for where it would not be found
     chance, power : of a false alarm of one test; of finding. ``chance_of_one`` of ``blunders`` is that of a whole hole
     """
-    spread = found.cofactor(weights, np.zeros((len(found.common_cov), weights.shape[2])))
+    spread = found.cofactor(weights, np.zeros((len(found.known), weights.shape[2])))
     told: dict[Hypothesis, Reliability] = {}
     for width, same in itertools.groupby(sorted(hypotheses, key=_width_of), key=_width_of):
         needed = least_noncentrality(width, chance, power)

@@ -197,7 +197,7 @@ def deviance_of(found: Adjusted) -> float:
     width = len(found.extra.std)
     core = len(found.known) - width
     squares += float(departure[:core] @ found.known[:core, :core] @ departure[:core]) + found.squares
-    size = 2.0 * float(np.log(np.einsum("kaa->ka", solution.diagonal)).sum()) - _log_size(solution.cov)
+    size = 2.0 * float(np.log(np.einsum("kaa->ka", solution.diagonal)).sum()) - solution.in_common.log_size
     size -= prior_size + _log_size(found.known[:core, :core]) + _log_size(found.linear.weights)
     if width:
         size += _log_size(solution.cov[core:, core:])

@@ -40,16 +40,17 @@ def warm_adjustment() -> None:
         jacobians, weights, residuals, np.zeros(1),
     )  # fmt: skip
     weigh_down(residuals, 1.0, weights, np.zeros(1))
-    extra, common = np.zeros((1, 3, 0)), np.zeros((width + 1, width + 1))
+    places, extra, common = np.arange(6)[None].copy(), np.zeros((1, 3, 0)), np.zeros((width + 1, width + 1))
     add_looks(
-        first, first, first, jacobians, weights, residuals, extra, 6, np.zeros((1, 2, 2)), np.zeros((1, 2, width + 1)),
-        common,
+        first, first, first, jacobians, weights, residuals, extra, places, 6, np.zeros((1, 2, 2)),
+        np.zeros((1, 2, width + 1)), common,
     )  # fmt: skip
     add_right_sides(
         first, first, first, jacobians, weights, residuals, extra, 6, np.zeros((1, 4)), np.zeros(width),
     )  # fmt: skip
     take_step(
-        first, first, first, jacobians, residuals, extra, 6, np.zeros((1, 4)), np.zeros(width), np.zeros((1, 3)),
+        first, first, first, jacobians, residuals, extra, places, 6, np.zeros((1, 4)), np.zeros(width),
+        np.zeros((1, 3)),
     )  # fmt: skip
     mirror_upper(common, width)
     diagonal, tied, coupled = np.eye(4)[None].copy(), np.zeros((1, 4, 4)), np.zeros((1, 4, width + 1))

@@ -138,7 +138,7 @@ def gather_columns(jacobian: Array, extra: Array, residual: Array, rows: Array) 
 @allocating_kernel
 def add_looks(
     station: Places, tube: Places, make_up: Places, jacobians: Array, weights: Array, residuals: Array, extra: Array,
-    gravity_at: int, at_station: Array, coupled: Array, in_common: Array,
+    places: Places, gravity_at: int, at_station: Array, coupled: Array, in_common: Array,
 ) -> None:  # fmt: skip
     """Add the looks to the normal equations.
 
@@ -146,8 +146,9 @@ def add_looks(
     ----------
     station, tube, make_up, jacobians, weights, residuals : as they were linearised
     extra : (n, 3, e), columns of further effects
-    gravity_at : column of gravity among those of all stations; those of a tube begin at six times its place, those of
-        the make-ups follow that of gravity, and further effects are last
+    places : (m, 6), columns of every tube among those of all stations; growing, and of unknowns whose jacobian is zero
+        any of its own
+    gravity_at : column of gravity; those of the make-ups follow it, and further effects are last
     at_station : (s + 1, 2, 2), information on every direction, added to
     coupled : (s + 1, 2 or more, p + 1), of direction and what stations have in common; the last column is the right
         side
@@ -162,7 +163,7 @@ def add_looks(
     for k in range(len(station)):
         j, w = jacobians[k], weights[k]
         for a in range(6):
-            at[a] = 6 * tube[k] + a
+            at[a] = places[tube[k], a]
         at[6], at[7] = gravity_at, gravity_at + 1 + make_up[k]
         for a in range(count):
             at[8 + a] = right - count + a
@@ -226,24 +227,24 @@ def add_right_sides(
 
 @kernel
 def take_step(
-    station: Places, tube: Places, make_up: Places, jacobians: Array, residuals: Array, extra: Array, gravity_at: int,
-    states: Array, common: Array, left: Array,
+    station: Places, tube: Places, make_up: Places, jacobians: Array, residuals: Array, extra: Array, places: Places,
+    gravity_at: int, states: Array, common: Array, left: Array,
 ) -> None:  # fmt: skip
     """Set what looks leave (n, 3) once the unknowns have gone a step.
 
     Parameters
     ----------
-    station, tube, make_up, jacobians, residuals, extra, gravity_at : of the looks, see ``add_looks``
+    station, tube, make_up, jacobians, residuals, extra, places, gravity_at : see ``add_looks``
     states, common : (s + 1, 2 or more) and (p,), the step of directions, and of what stations have in common
     """
     count, size = extra.shape[2], len(common)
     for k in range(len(station)):
-        of_direction, first, turn = states[station[k]], 6 * tube[k], common[gravity_at + 1 + make_up[k]]
+        of_direction, own, turn = states[station[k]], places[tube[k]], common[gravity_at + 1 + make_up[k]]
         for i in range(3):
             j = jacobians[k, i]
             moved = j[0] * of_direction[0] + j[1] * of_direction[1] + j[7] * turn + j[8] * common[gravity_at]
             for a in range(6):
-                moved += j[2 + a] * common[first + a]
+                moved += j[2 + a] * common[own[a]]
             for a in range(count):
                 moved += extra[k, i, a] * common[size - count + a]
             left[k, i] = residuals[k, i] - moved
