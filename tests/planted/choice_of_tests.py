@@ -16,6 +16,8 @@ WHOLE = {  # quick tests that look at a whole room: without importing it, or fro
     "borechain/cli/": ("test_options_whole.py",),
     "borechain/gauntlet/": ("gauntlet/test_oracles_by_hand.py", "gauntlet/test_wellness_by_hand.py"),
     "borechain/studies/": ("studies/test_studies_whole.py", "studies/test_set_up_study_whole.py"),
+    "node/firmware/": ("node/test_seeded_nodes.py",),
+    "node/kernels/": ("node/test_seeded_nodes.py",),
 }
 IMPORT = re.compile(r"^ *(?:from|import) ([\w.]+)(?: import ([\w, ]*))?", re.MULTILINE)
 
