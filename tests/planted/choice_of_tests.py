@@ -18,6 +18,11 @@ WHOLE = {  # quick tests that look at a whole room: without importing it, or fro
     "borechain/studies/": ("studies/test_studies_whole.py", "studies/test_set_up_study_whole.py"),
     "node/firmware/": ("node/test_seeded_nodes.py",),
     "node/kernels/": ("node/test_seeded_nodes.py",),
+    "node/process/": ("test_seeded_rigs.py",),
+    "telemetry/application/": ("test_seeded_rigs.py",),
+    "telemetry/presentation/": ("test_seeded_rigs.py",),
+    "telemetry/runtime/": ("test_seeded_rigs.py",),
+    "telemetry/transport/": ("test_seeded_rigs.py",),
 }
 IMPORT = re.compile(r"^ *(?:from|import) ([\w.]+)(?: import ([\w, ]*))?", re.MULTILINE)
 
