@@ -19,9 +19,10 @@ from typing import Any
 import pytest
 from test_can_exchange import joined
 
-from telemetry.errors import EncodeError
+from telemetry.errors import DecodeError, EncodeError
 from telemetry.frozen import replace as changed
 from telemetry.media.can_exchange import ACKNOWLEDGE_LIMIT
+from telemetry.media.can_identifier import Identifier
 from telemetry.media.port import PortFrame, Priority
 from telemetry.presentation.can_c_codec import write_native_codec
 from telemetry.presentation.can_messages import NATIVE, NativeMessage
@@ -103,7 +104,15 @@ def exchange_lines() -> Iterator[str]:
         yield from (f"  {at:.3f} {tuple(map(int, identifier))}" for at, identifier in wire.sent)
         for address, heard in wire.heard.items():
             yield from (f"  {address} heard {payload[:4].decode()} {len(payload)}" for payload in heard)
-        yield from (f"  {end.address} {end.is_up}" for end in (upper, lower))
+        for _ in range(200):  # what nobody has sent, and one that has the lower end's address
+            identifier = Identifier(dice.randrange(8), dice.choice([29, 30, 31, 3]), dice.choice([1, 2, 9]), 0, 255)
+            data = bytes(dice.getrandbits(8) for _ in range(dice.choice([0, 1, 5, 8, largest])))
+            for end in (upper, lower):
+                with contextlib.suppress(DecodeError):
+                    end.on_frame(identifier.pack(), data, wire.now)
+            wire.run(0.002)
+        for end in (upper, lower):
+            yield f"  {end.address} {end.is_up} {dict(end.counters)}"
 
 
 def radio_lines() -> Iterator[str]:

@@ -5,7 +5,9 @@ Firmware, links, disks and ground station run as they do in a rig of processes; 
 
 from __future__ import annotations
 
+import datetime
 import json
+import random
 import tempfile
 import zlib
 from collections import defaultdict
@@ -13,13 +15,18 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from sealed_string import make_folder
 from seeded_nodes import weighed
 
-from borechain.gauntlet.gauntlet_rig import PLANS, WORLDS, GauntletRig, make_ready, new_rig
+from borechain.drilling.inline import InlineRig
+from borechain.gauntlet.gauntlet_rig import PLANS, WORLDS, make_ready, new_rig
 from borechain.gauntlet.gauntlet_run import ALL, ANSWERED_AFTER
 from groundstation.service.answers.answer_table import ANSWERS
 from sim.gauntlet.plan import steps_of
+from sim.rig.in_process import InProcessStepper
 from sim.rig.stepper import Answer, FrameEvent
+from sim.world.scenario import scenario_of
+from sim.world.world import World
 from telemetry.errors import BorechainError
 
 FIGURES = Path(__file__).parents[1] / "data" / "seeded_rigs.json"
@@ -34,10 +41,10 @@ NOT_ASKED = "column", "setup"  # a second of drawing; ages by the time of day
 class Traffic:
     """Counts what the processes of a rig send: frames, their bytes, and when."""
 
-    def __init__(self, rig: GauntletRig) -> None:
+    def __init__(self, stepper: InProcessStepper) -> None:
         self.sent: dict[str, list[tuple[float, int]]] = defaultdict(list)
-        self._round: Callable[..., dict[int, Answer]] = rig.stepper.round
-        rig.stepper.round = self.round  # type: ignore[method-assign]
+        self._round: Callable[..., dict[int, Answer]] = stepper.round
+        stepper.round = self.round  # type: ignore[method-assign]
 
     def round(self, steps: Mapping[int, list[FrameEvent]]) -> dict[int, Answer]:
         """A round of the rig, whose frames are noted."""
@@ -67,7 +74,7 @@ def figures_of(seed: int) -> dict[str, Any]:
     make_ready(PLAN, [seed])
     with tempfile.TemporaryDirectory(prefix="seeded-") as folder:
         rig = new_rig(PLAN, seed, Path(folder))
-        traffic = Traffic(rig)
+        traffic = Traffic(rig.stepper)
         begin, until = rig.world.begin + chosen.rested, rig.world.end - chosen.calm
         steps = steps_of(seed, RIGS[seed], begin + chosen.after_begin, until, recovers=not chosen.calm)
         rig.drill([step for _, step in steps], until=until)
@@ -76,8 +83,29 @@ def figures_of(seed: int) -> dict[str, Any]:
             rig.advance(until + after)
             rig.answer_alarms()
         rig.advance(rig.world.end)
-        shown = {path: answer_of(rig, path) for path in paths()}
+        found = shown_by(rig.inline, traffic, begin)
         rig.close()
+    return found
+
+
+def sealed_figures() -> dict[str, Any]:
+    """The same of a rig under keys, whose joints round what is cyclic, without a fault."""
+    world = World(scenario_of(dict(PLANS["minute"].tables)), FIRST)
+    lots = random.Random(FIRST)
+    with tempfile.TemporaryDirectory(prefix="seeded-") as place:
+        keys = make_folder(Path(place) / "keys", now=datetime.datetime.now(datetime.UTC))
+        settings = PLANS["minute"].settings
+        rig = InlineRig(world, settings, "rig-1", Path(place), lots.randrange, native=True, keys=keys)
+        traffic = Traffic(rig.stepper)
+        rig.run()
+        found = shown_by(rig, traffic, world.begin)
+        rig.close()
+    return found
+
+
+def shown_by(rig: InlineRig, traffic: Traffic, begin: float) -> dict[str, Any]:
+    """Figures of a rig that has drilled since ``begin`` (s)."""
+    shown = {path: answer_of(rig, path) for path in paths()}
     events = [[e["tube"], e["code"], e["severity"], round(e["at_s"] - begin, 2)] for e in shown["events"]["events"]]
     sent = {end: [len(frames), *weighed(frames)] for end, frames in sorted(traffic.sent.items())}
     return {"events": events, "sent": sent, "shown": {name: sums_of(answer) for name, answer in shown.items()}}
@@ -92,10 +120,10 @@ def paths() -> Iterator[str]:
             yield pattern.replace("{tube}", str(number)).replace("{n}", str(number))
 
 
-def answer_of(rig: GauntletRig, path: str) -> dict[str, Any]:
+def answer_of(rig: InlineRig, path: str) -> dict[str, Any]:
     """What the ground station answers, or why it does not."""
     try:
-        return rig.inline.ask(path)
+        return rig.ask(path)
     except BorechainError as error:
         return {"refused": str(error)}
 
@@ -112,7 +140,7 @@ def sums_of(answer: Mapping[str, Any]) -> list[float]:
 
 def everything() -> dict[str, Any]:
     """Figures of all rigs."""
-    return {str(seed): figures_of(seed) for seed in RIGS}
+    return {str(seed): figures_of(seed) for seed in RIGS} | {"sealed": sealed_figures()}
 
 
 if __name__ == "__main__":
