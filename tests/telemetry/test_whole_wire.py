@@ -104,7 +104,7 @@ def exchange_lines() -> Iterator[str]:
         yield from (f"  {at:.3f} {tuple(map(int, identifier))}" for at, identifier in wire.sent)
         for address, heard in wire.heard.items():
             yield from (f"  {address} heard {payload[:4].decode()} {len(payload)}" for payload in heard)
-        for _ in range(200):  # what nobody has sent, and one that has the lower end's address
+        for _ in range(200):  # garbage, some of it under the address of an end
             identifier = Identifier(dice.randrange(8), dice.choice([29, 30, 31, 3]), dice.choice([1, 2, 9]), 0, 255)
             data = bytes(dice.getrandbits(8) for _ in range(dice.choice([0, 1, 5, 8, largest])))
             for end in (upper, lower):
