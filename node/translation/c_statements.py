@@ -154,8 +154,11 @@ class CStatements:
     def _over_tuple(self, statement: ast.For, several: ast.Tuple, depth: int) -> None:
         assert isinstance(statement.target, ast.Name)
         name, count = c_word(statement.target.id), len(several.elts)
-        numbers = ", ".join(self._expressions.value(one).code for one in several.elts)
-        self._emit(depth, f"static const int64_t {name}_of[{count}] = {{{numbers}}};")
+        parts = [self._expressions.value(one) for one in several.elts]
+        # C wants constants in what is kept between calls; an element of a table is none
+        storage = "static " if all(part.known is not None and "[" not in part.code for part in parts) else ""
+        numbers = ", ".join(part.code for part in parts)
+        self._emit(depth, f"{storage}const int64_t {name}_of[{count}] = {{{numbers}}};")
         self._emit(depth, f"for (int64_t {name}_at = 0; {name}_at < {count}; {name}_at++) {{")
         self._emit(depth + 1, f"const int64_t {name} = {name}_of[{name}_at];")
         self._expressions.variables[statement.target.id] = CValue(name, INTEGER)

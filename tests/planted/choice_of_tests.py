@@ -20,6 +20,18 @@ WHOLE = {  # quick tests that look at a whole room: without importing it, or fro
     "borechain/cli/": ("test_options_whole.py",),
     "borechain/gauntlet/": ("gauntlet/test_oracles_by_hand.py", "gauntlet/test_wellness_by_hand.py"),
     "borechain/studies/": ("studies/test_studies_whole.py", "studies/test_set_up_study_whole.py"),
+    "node/firmware/": ("node/test_seeded_nodes.py",),
+    "node/kernels/": ("node/test_seeded_nodes.py",),
+    "node/process/": ("test_seeded_rigs.py",),
+    "node/translation/c_": ("node/chip/test_translated_forms.py",),
+    "telemetry/application/": ("test_seeded_rigs.py",),
+    "telemetry/media/can_": ("telemetry/test_whole_wire.py",),
+    "telemetry/media/isotp.py": ("telemetry/test_whole_wire.py",),
+    "telemetry/media/send_queue.py": ("telemetry/test_whole_wire.py",),
+    "telemetry/presentation/": ("telemetry/test_whole_wire.py", "test_seeded_rigs.py"),
+    "telemetry/radio/": ("telemetry/test_whole_wire.py",),
+    "telemetry/runtime/": ("test_seeded_rigs.py",),
+    "telemetry/transport/": ("test_seeded_rigs.py",),
 }
 IMPORT = re.compile(r"^ *(?:from|import) ([\w.]+)(?: import ([\w, ]*))?", re.MULTILINE)
 
