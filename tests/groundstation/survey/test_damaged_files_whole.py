@@ -164,7 +164,7 @@ RELAYED = (
     "md_m,inclination_deg,azimuth_deg,time_s,yaw_sigma_deg,force_sigma_mps2\n"
     "0,0.5,20,10,0.2,0.004\n4,1.25,24,610,0.23,0.005\n8,2.5,31,1210,0.26,0.006\n12,3.75,29,1810,0.29,0.007\n"
 )
-ACCURACY = "preset_deg,reading_deg\n0,0.1\n0,0.3\n30,30.2\n30,29.7\n60,60.5\n60,60.1\n"
+ACCURACY = "preset_deg,reading_deg\n15,15.1\n15,15.3\n30,30.2\n30,29.7\n60,60.5\n60,60.1\n"
 TEXTS = {name: make().decode("utf-16" if name == "usft.txt" else "cp1252" if name == "old.csv" else "utf-8")
          for name, make in FORMATS.items() if name != "book.xlsx"}  # fmt: skip
 KINDS = [
