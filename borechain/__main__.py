@@ -61,8 +61,6 @@ COMMANDS = {
     ),
     "experiment": ("borechain.cli.experiment.experiment", "experiment", "Rerun a published experiment beside ours."),
 }
-# whose matrices are small: a second thread would wait most of the time
-ONE_THREAD = ("ground", "bench", "rig", "demo", "gauntlet")
 
 
 class LazyGroup(click.Group):

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from groundstation.entry.entry_warning import EntryWarning
+from groundstation.entry.quantity_ranges import RANGES
 from groundstation.entry.station_plausibility import design_warnings
 from groundstation.errors import SurveyError
 from groundstation.survey.files.field_files import read_any
@@ -23,6 +24,7 @@ from telemetry.toml_tables import parse_toml_tables
 SAME = 1e-6  # m and deg
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 OneInclination = Annotated[float, Field(ge=0.0, le=180.0)]
+OneAzimuth = Annotated[float, Field(ge=RANGES["azimuth_deg"].low, le=RANGES["azimuth_deg"].high)]
 
 
 class PlanPart(BaseModel):
@@ -42,7 +44,7 @@ class LegSettings(PlanPart):
     build_deg_per_m: Finite = 0.0
     turn_deg_per_m: Finite = 0.0
     to_inclination_deg: OneInclination | None = None
-    to_azimuth_deg: Finite | None = None
+    to_azimuth_deg: OneAzimuth | None = None
 
     @property
     def has_target(self) -> bool:
@@ -62,10 +64,12 @@ class PlanSettings(PlanPart):
     east_m: Finite = 0.0
     down_m: Finite = 0.0
     inclination_deg: OneInclination = Field(0.0, description="in which the first leg begins")
-    azimuth_deg: Finite = 0.0
+    azimuth_deg: OneAzimuth = 0.0
     tolerance: str = Field("", description="limit along the plan, such as 50 mm + 1:200; that of the hole if absent")
     leg: tuple[LegSettings, ...] = ()
-    stations: tuple[tuple[Finite, OneInclination, Finite], ...] = Field((), description="depth, inclination, azimuth")
+    stations: tuple[tuple[Finite, OneInclination, OneAzimuth], ...] = Field(
+        (), description="depth, inclination, azimuth"
+    )
 
     @property
     def head(self) -> tuple[float, float, float]:

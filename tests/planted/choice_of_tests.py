@@ -16,6 +16,11 @@ COSTLY = ("processes", "studies", "page", "gauntlet", "truth", "planted", "tools
 FEW = 3  # files; where fewer import the module itself, those are added that import who imports it
 MOST = 6  # files
 FARTHEST = 4  # imports between a test and a module that no test imports itself
+CALIBRATIONS, PAPERS, STATIONS, WALLS = (
+    f"groundstation/{name}_whole.py"
+    for name in ("calibration/test_calibrations", "test_papers", "test_stations", "test_walls")
+)
+DAMAGED, SURVEYS = (f"groundstation/survey/test_{name}_whole.py" for name in ("damaged_files", "surveys"))
 WHOLE = {  # quick tests that look at a whole room: without importing it, or from a folder of which none is chosen
     "borechain/cli/": ("test_options_whole.py",),
     "borechain/gauntlet/": ("gauntlet/test_oracles_by_hand.py", "gauntlet/test_wellness_by_hand.py"),
@@ -32,6 +37,25 @@ WHOLE = {  # quick tests that look at a whole room: without importing it, or fro
     "telemetry/radio/": ("telemetry/test_whole_wire.py",),
     "telemetry/runtime/": ("test_seeded_rigs.py",),
     "telemetry/transport/": ("test_seeded_rigs.py",),
+    "groundstation/calibration/": (CALIBRATIONS, DAMAGED),
+    "groundstation/entry/": (DAMAGED,),
+    "groundstation/plan_settings": (DAMAGED,),
+    "groundstation/recording/": (STATIONS,),
+    "groundstation/report/calibration": (CALIBRATIONS,),
+    "groundstation/report/plots": (SURVEYS, WALLS),
+    "groundstation/report/rest": (CALIBRATIONS,),
+    "groundstation/report/s": (CALIBRATIONS, SURVEYS),
+    "groundstation/report/": (PAPERS,),
+    "groundstation/service/": (STATIONS,),
+    "groundstation/survey/adjustment/": (STATIONS,),
+    "groundstation/survey/exports/": (SURVEYS, WALLS),
+    "groundstation/survey/files/": (DAMAGED, SURVEYS),
+    "groundstation/survey/fusion/": (STATIONS,),
+    "groundstation/survey/path/": (STATIONS, SURVEYS),
+    "groundstation/survey/requests/": (SURVEYS, WALLS),
+    "groundstation/survey/tools/": (SURVEYS, PAPERS),
+    "groundstation/survey/wall/": (WALLS, DAMAGED),
+    "groundstation/survey/well/": (SURVEYS, STATIONS),
 }
 IMPORT = re.compile(r"^ *(?:from|import) ([\w.]+)(?: import ([\w, ]*))?", re.MULTILINE)
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.entry.null_values import is_null
+from groundstation.entry.quantity_ranges import RANGES
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.well.analysis import Stretch
@@ -22,7 +23,10 @@ from groundstation.survey.well.reference_frames import TieOn
 from telemetry.bounded_bytes import bounded_text
 from telemetry.toml_tables import parse_toml_tables
 
-PLACE = ("md_m", "inclination_deg", "azimuth_deg", "north_m", "east_m", "tvd_m")
+PLACE = {  # what a tie-on says, and what each may be
+    "md_m": "depth", "inclination_deg": "inclination_deg", "azimuth_deg": "azimuth_deg", "north_m": "coordinate",
+    "east_m": "coordinate", "tvd_m": "depth",
+}  # fmt: skip
 SMALLEST = -1e-12  # of the largest variance, that rounding may leave
 
 
@@ -68,9 +72,9 @@ def read_tie_on(path: Path) -> TieOn:
     for key in PLACE:
         if key not in data:
             raise SurveyError(f"{path}: {key} is missing")
-    values = {key: _number(str(path), key, data[key]) for key in PLACE}
-    if not 0.0 <= values["inclination_deg"] <= 180.0:
-        raise SurveyError(f"{path}: inclination_deg: expected 0..180, got {values['inclination_deg']:g}")
+    values = {
+        key: RANGES[what].check(f"{path}: {key}", _number(str(path), key, data[key])) for key, what in PLACE.items()
+    }
     place = np.array([values["north_m"], values["east_m"], values["tvd_m"]])
     inclination, azimuth = (math.radians(values[key]) for key in ("inclination_deg", "azimuth_deg"))
     return TieOn(values["md_m"], inclination, azimuth, place, _covariance(path, data))

@@ -119,6 +119,9 @@ def read_heads(path: Path, defaults: Defaults, north: str) -> list[HeadRow]:
     wrong = np.flatnonzero(~np.isfinite(heads).all(axis=1))
     if len(wrong):
         raise SurveyError(f"{path}: line {lines[wrong[0]]}: expected finite north_m and east_m")
+    for line, head in zip(lines, heads.tolist(), strict=True):
+        for key, value in zip(NEEDED[1:], head, strict=True):
+            RANGES["coordinate"].check(f"{path}: line {line}: {key}", value)
     tools: dict[str, SurveyTool] = {}
     courses: dict[str, PlanSettings] = {}
     rows = []

@@ -194,7 +194,10 @@ def test_programmes_and_tie_ons_are_read_from_files(tmp_path: Path) -> None:
     [
         ("md_m = 5", "inclination_deg is missing"),
         ("depth = 5", "depth: unknown key"),
-        ("md_m = 0\ninclination_deg = 200\nazimuth_deg = 0\nnorth_m = 0\neast_m = 0\ntvd_m = 0", "expected 0..180"),
+        (
+            "md_m = 0\ninclination_deg = 200\nazimuth_deg = 0\nnorth_m = 0\neast_m = 0\ntvd_m = 0",
+            "inclination_deg: expected an inclination of 0..180 deg, got 200",
+        ),
         (
             "md_m = 0\ninclination_deg = 2\nazimuth_deg = 0\nnorth_m = 0\neast_m = 0\ntvd_m = 0\n"
             "covariance_m2 = [[1, 2, 0], [2, 1, 0], [0, 0, 1]]",
