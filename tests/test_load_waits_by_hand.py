@@ -95,7 +95,7 @@ def test_lines_of_a_stream_are_whole_wherever_it_is_cut_and_end_with_it() -> Non
     with ours, theirs:
         theirs.sendall(b"one\n")
         assert list(readers.read_lines(ours, time.monotonic() - 1.0)) == []
-        assert list(readers.read_lines(ours, time.monotonic() + 0.05)) == [b"one"]  # nobody says more
+        assert list(readers.read_lines(ours, time.monotonic() + 0.05)) == [b"one"]  # no more is said
 
 
 def test_only_states_of_tubes_are_late() -> None:
@@ -301,7 +301,7 @@ def test_one_who_is_shut_out_is_not_answered_while_the_other_is(
         assert not true()
         his_old, his.get = his.get, answering([]).get
         hers.get = answering([]).get
-        assert not true() or order[-1] == "handed"  # nobody is answered: the router is away
+        assert not true() or order[-1] == "handed"  # none is answered: the router is away
         his.get = his_old
         string.look(true)
         order.append("waited")

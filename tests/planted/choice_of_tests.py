@@ -12,10 +12,18 @@ from defect_lists import Defect, DefectError
 COSTLY = ("processes", "studies", "page", "gauntlet", "truth", "planted", "tools")  # folders that are named, not chosen
 FEW = 3  # files; where fewer import the module itself, those are added that import who imports it
 MOST = 6  # files
-WHOLE = {  # quick tests that look at a whole room: without importing it, or from a folder of which none is chosen
+SEEDED = ("sim/test_seeded_worlds.py",)
+WHOLE = {  # tests that look at a whole room: without importing it, or from a folder of which none is chosen
+    "benchmarks/": ("test_benches_by_hand.py", "test_benches_of_rigs_by_hand.py"),
     "borechain/cli/": ("test_options_whole.py",),
     "borechain/gauntlet/": ("gauntlet/test_oracles_by_hand.py", "gauntlet/test_wellness_by_hand.py"),
     "borechain/studies/": ("studies/test_studies_whole.py", "studies/test_set_up_study_whole.py"),
+    "sim/campaign/": SEEDED,
+    "sim/gauntlet/": ("gauntlet/test_faults_as_they_were.py",),
+    "sim/instruments/": SEEDED,
+    "sim/string/": SEEDED,
+    "sim/studies/": ("sim/test_study_tables.py",),
+    "sim/world/": SEEDED,
 }
 IMPORT = re.compile(r"^ *(?:from|import) ([\w.]+)(?: import ([\w, ]*))?", re.MULTILINE)
 

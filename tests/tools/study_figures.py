@@ -19,12 +19,13 @@ import numpy as np
 
 FIGURES = Path(__file__).parents[1] / "data" / "studies" / "figures.json"
 APART = 1e-6  # of the sum of all sizes; last bits of floats differ between families of processors
+TIMES = ("time_over_other", "time_over_other_alone", "milliseconds")  # of a machine, and no figure
 Figure = list[Any]  # words of a column, or the sum by weights that differ and that of the sizes
 
 
 def figures_of(result: dict[str, Any]) -> dict[str, Figure]:
     """Figure of each column of each table of a study's result, and of each number beside them."""
-    return {name: figure_of(values) for name, values in _columns(result)}
+    return {name: figure_of(values) for name, values in _columns(result) if not name.endswith(TIMES)}
 
 
 def figure_of(values: list[Any]) -> Figure:
