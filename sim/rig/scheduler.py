@@ -39,6 +39,7 @@ TELL_EVERY = 0.5  # wall s
 CUE_LIMIT = 120.0  # wall s
 CUE_AGAIN = 2.0  # rig s, until an operator who was too early tries again
 REBOOT_TIME = 5.0  # rig s that a process may be missing before the rig's time waits for it
+AFTER_END = 120.0  # rig s after the schedule in which what is under way arrives and is receipted
 CYCLE, TIMER = Due.CYCLE, Due.TIMER
 Entry = tuple[float, int, int, int, "Due | None", Content, "float | None"]
 
@@ -116,7 +117,7 @@ class Scheduler:
         Raises
         ------
         RigError
-            When a wanted process does not come.
+            When a wanted process does not come, or processes find no rest after the schedule.
         """
         self.begin()
         self.advance()
@@ -144,8 +145,13 @@ class Scheduler:
         self._wall_begin = time.monotonic()
 
     def advance(self, to: float = math.inf, until: Callable[[], bool] = lambda: False) -> None:
-        """Let the rig's time pass to ``to`` (s), to the end of the schedule, or until something holds."""
+        """Let the rig's time pass to ``to`` (s), to the end of the schedule, or until something holds.
+
+        Raises as ``run`` does.
+        """
         while self._queue and self._queue[0][0] <= to and not self._stopping and not until():
+            if self._queue[0][0] > self.world.end + AFTER_END:
+                self._refuse_restless()
             if self._changes and self._changes[0].at <= self._queue[0][0]:
                 self._changes.popleft().apply()
                 continue
@@ -155,6 +161,11 @@ class Scheduler:
             if self._speed < math.inf:
                 self._pace(self._queue[0][0])
             self._round(limit)
+
+    def _refuse_restless(self) -> None:
+        """No cycle comes any more: who wakes itself or hears others now would do so for ever."""
+        names = ", ".join(dict.fromkeys(address_name(entry[1]) for entry in sorted(self._queue)))
+        raise RigError(f"{names}: expected rest within {AFTER_END:.0f} s after the schedule, steps are still asked for")
 
     def _all_changes(self) -> list[Change]:
         """Everything the schedule and the faults do to the rig, in order of time."""

@@ -21,7 +21,9 @@ CALIBRATIONS, PAPERS, STATIONS, WALLS = (
     for name in ("calibration/test_calibrations", "test_papers", "test_stations", "test_walls")
 )
 DAMAGED, SURVEYS = (f"groundstation/survey/test_{name}_whole.py" for name in ("damaged_files", "surveys"))
-WHOLE = {  # quick tests that look at a whole room: without importing it, or from a folder of which none is chosen
+SEEDED = ("sim/test_seeded_worlds.py",)
+WHOLE = {  # tests that look at a whole room: without importing it, or from a folder of which none is chosen
+    "benchmarks/": ("test_benches_by_hand.py", "test_benches_of_rigs_by_hand.py"),
     "borechain/cli/": ("test_options_whole.py",),
     "borechain/gauntlet/": ("gauntlet/test_oracles_by_hand.py", "gauntlet/test_wellness_by_hand.py"),
     "borechain/studies/": ("studies/test_studies_whole.py", "studies/test_set_up_study_whole.py"),
@@ -56,6 +58,12 @@ WHOLE = {  # quick tests that look at a whole room: without importing it, or fro
     "groundstation/survey/tools/": (SURVEYS, PAPERS),
     "groundstation/survey/wall/": (WALLS, DAMAGED),
     "groundstation/survey/well/": (SURVEYS, STATIONS),
+    "sim/campaign/": SEEDED,
+    "sim/gauntlet/": ("gauntlet/test_faults_as_they_were.py",),
+    "sim/instruments/": SEEDED,
+    "sim/string/": SEEDED,
+    "sim/studies/": ("sim/test_study_tables.py",),
+    "sim/world/": SEEDED,
 }
 IMPORT = re.compile(r"^ *(?:from|import) ([\w.]+)(?: import ([\w, ]*))?", re.MULTILINE)
 

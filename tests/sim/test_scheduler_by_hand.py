@@ -13,8 +13,9 @@ import pytest
 from seeded_worlds import SEED, STRING, figure_of
 
 from node.kernels.arithmetic.formats import PERIOD
+from sim.errors import RigError
 from sim.rig.rig_progress import RigProgress
-from sim.rig.scheduler import Scheduler
+from sim.rig.scheduler import AFTER_END, Scheduler
 from sim.rig.stepper import Acted, Answer, FrameEvent
 from sim.studies.scenarios import change_sections
 from sim.world.scenario import scenario_of
@@ -227,6 +228,36 @@ def test_what_hangs_is_ended_once_and_a_stop_ends_after_the_round() -> None:
     scheduler.stop()
     scheduler.advance()
     assert stepper.rounds == rounds
+
+
+class RestlessStepper(NotingStepper):
+    """Processes that ask to be woken again and again, until so many s after the schedule."""
+
+    lasts = math.inf
+
+    def round(self, steps: Mapping[int, list[FrameEvent]]) -> dict[int, Answer]:
+        at = max(self.world.true_time(address, event.at) for address, events in steps.items() for event, _ in events)
+        rests = at > self.world.end + self.lasts
+        return {
+            address: Answer([], math.inf if rests else events[-1][0].at + NEXT) for address, events in steps.items()
+        }
+
+
+@pytest.mark.parametrize("lasts", [AFTER_END - 4.0 * NEXT, math.inf])
+def test_who_finds_no_rest_after_the_schedule_is_named(lasts: float) -> None:
+    world = World(scenario_of(dict(TABLES)), SEED)
+    stepper = RestlessStepper(world)
+    stepper.lasts = lasts
+    scheduler = Scheduler(world, stepper, stepper.follow)  # type: ignore[arg-type]
+    scheduler.begin(world.end - 1.0)
+    if math.isfinite(lasts):
+        scheduler.advance()
+        assert scheduler.now > world.end + lasts
+        return
+    with pytest.raises(RigError, match=r": expected rest within 120 s after the schedule, steps are still") as refused:
+        scheduler.advance()
+    assert sorted(str(refused.value).partition(":")[0].split(", ")) == ["1", "base", "encoder"]
+    assert world.end + AFTER_END - 2.0 * NEXT < scheduler.now <= world.end + AFTER_END
 
 
 if __name__ == "__main__":

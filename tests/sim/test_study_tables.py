@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from study_figures import FIGURES, apart, figures_of
 
 from borechain.cli.calibrate.calibrate import calibrate
 from borechain.cli.experiment.experiment import experiment
@@ -22,6 +23,8 @@ from sim.studies.pool import CORES, one_pool, over_cores, seed_jobs, usable_core
 from sim.studies.study import Option, ResultTable, Study
 from sim.studies.study_table import STUDIES
 
+UNKEPT = ("blunders", "set-up")  # whole rigs for minutes, whose parts are in tests/studies
+FIGURES_KEPT = json.loads(FIGURES.read_text("utf-8"))
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 KEPT = [*STUDIES.values(), *RIG_STUDIES.values()]  # whose tables stand there
 # the longest with two seeds; the modes share the code of two-nodes, the others have tests of their own
@@ -145,6 +148,8 @@ def test_every_study_runs_with_few_seeds_and_keeps_what_its_line_says(study: Stu
     assert done.exit_code == 0, done.output
     result = json.loads(done.stdout)
     assert "traces" not in result
+    if study.name not in UNKEPT:
+        assert apart(figures_of(result), FIGURES_KEPT[study.name]) == {}
     # of the study of the field one disturbance was asked, which is in one of its two worlds
     assert sum(not result[table.rows] for table in study.tables) <= (study.name == "field")
     for table in study.tables:
@@ -158,6 +163,22 @@ def test_every_study_runs_with_few_seeds_and_keeps_what_its_line_says(study: Stu
     drawn = {path.name for path in tmp_path.glob("*.svg")}
     assert bool(drawn) == study.drawn
     assert all((RESULTS / name).exists() for name in drawn)
+
+
+def test_every_study_has_its_figures_and_a_figure_moves_with_every_number_word_and_order() -> None:
+    assert sorted(FIGURES_KEPT) == sorted(study.name for study in KEPT if study.name not in UNKEPT)
+    rows = [{"case": "a", "x": 1.5, "y": [0.25, None]}, {"case": "b", "x": -0.5, "z": 3}]
+    base = figures_of({"cases": rows, "seeds": 2, "notes": ["n"]})
+    assert list(base) == ["cases.case", "cases.x", "cases.y", "cases.z", "seeds", "notes"]
+    assert apart(base, base) == {}
+    for change in (
+        {"case": "c"}, {"x": 1.5001}, {"x": -1.5}, {"y": [0.25, 0.5]}, {"y": [None, 0.25]}, {"w": 1.0},
+    ):  # fmt: skip
+        other = figures_of({"cases": [rows[0] | change, rows[1]], "seeds": 2, "notes": ["n"]})
+        assert list(apart(other, base)) == [f"cases.{name}" for name in change]
+    assert set(apart(figures_of({"cases": rows[::-1], "seeds": 2, "notes": ["n"]}), base)) >= {"cases.case", "cases.x"}
+    assert list(apart(figures_of({"cases": rows, "seeds": 3, "notes": ["m"]}), base)) == ["seeds", "notes"]
+    assert apart({}, {"x": [1.0, 1.0]}) == {"x": (None, [1.0, 1.0])}
 
 
 def test_the_arguments_of_make_study_are_ones_that_the_studies_take() -> None:
