@@ -82,7 +82,7 @@ def refuse_used_folder(folder: Path) -> None:
                 f"output folder {folder}: expected a new or empty folder, it holds an earlier run; choose another --out"
             )
     except OSError as error:
-        raise unwritable(folder, error) from error
+        raise folder_refusal(folder, error) from error
 
 
 def prepare_folder(folder: Path) -> None:
@@ -100,10 +100,10 @@ def prepare_folder(folder: Path) -> None:
         trial.touch()
         trial.unlink()
     except OSError as error:
-        raise unwritable(folder, error) from error
+        raise folder_refusal(folder, error) from error
 
 
-def unwritable(folder: Path, error: OSError) -> RigError:
+def folder_refusal(folder: Path, error: OSError) -> RigError:
     """The refusal of an output folder that cannot be used."""
     return RigError(f"output folder {folder}: {error.strerror}; choose a writable folder with --out")
 

@@ -105,7 +105,7 @@ def test_of_an_end_that_is_more_likely_out(
         (0.0, 0.1, Word.STEER),  # not missed yet
         (less(0.0), 0.5, Word.STEER),
         (less(0.0), less(0.5), Word.OUT),
-        (None, 0.1, Word.WATCH),  # nobody knows where the bit is
+        (None, 0.1, Word.WATCH),  # where the bit is is not known
     ],
 )
 def test_of_a_deadline(left: float | None, best: float, expected: Word, deadline: list[Deadline]) -> None:
