@@ -22,6 +22,7 @@ from sim.gauntlet.faulty_channel import FaultyChannel
 from sim.gauntlet.faulty_disk import FaultyDisk
 from sim.gauntlet.faulty_world import MINUTE, FaultyWorld
 from sim.gauntlet.plan import combined_kinds, drawn_kinds, steps_of
+from sim.gauntlet.power import ROTTING
 from telemetry.messages import BASE, ENCODER, Hello, NodeMode, Side
 from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.transport.hop import HopLink
@@ -114,11 +115,17 @@ class NotingRig:
 
 
 def database() -> bytes:
-    """A database of six messages."""
+    """A database of six rows in each table in which rows rot."""
     with contextlib.closing(sqlite3.connect(":memory:")) as made:
-        made.execute("create table messages (id integer primary key, payload blob)")
-        for k in range(6):
-            made.execute("insert into messages values (?, ?)", (k, bytes(range(10 * k, 10 * k + 9))))
+        for table, columns in ROTTING.items():
+            names = sorted(set(columns))
+            made.execute(f"create table {table} (id integer primary key, {', '.join(names)})")
+            for k in range(6):
+                row = [bytes(range(10 * k, 10 * k + 9)) if name == "payload" else 1.5 * k + 0.1 for name in names]
+                row = [
+                    f"{k}{k + 1}{k + 2}" if name == "content" else value for name, value in zip(names, row, strict=True)
+                ]
+                made.execute(f"insert into {table} values (?{', ?' * len(names)})", (k, *row))
         made.commit()
         return made.serialize()
 
@@ -129,7 +136,10 @@ def payloads(content: bytes) -> bytes:
         return content
     with contextlib.closing(sqlite3.connect(":memory:")) as read, contextlib.suppress(sqlite3.DatabaseError):
         read.deserialize(content)
-        return b"".join(payload for (payload,) in read.execute("select payload from messages order by id"))
+        read.text_factory = bytes
+        return b"".join(
+            repr(row).encode() for table in ROTTING for row in read.execute(f"select * from {table} order by id")
+        )
     return b"damaged"
 
 

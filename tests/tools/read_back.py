@@ -113,7 +113,7 @@ def axes_lines(axes: Any) -> Iterator[str]:
         x, y = (np.asarray(values, float) for values in line.get_data(orig=False))
         yield f"line {label_of(line)} {look}: x {numbers(x)}; y {numbers(y)}"
     for patch in axes.patches:
-        outline = patch.get_patch_transform().transform(patch.get_path().vertices)
+        outline = without_closing(patch.get_patch_transform().transform(patch.get_path().vertices))
         look = f"{colour(patch.get_facecolor())} {colour(patch.get_edgecolor())} {patch.get_linestyle()}"
         yield f"{type(patch).__name__} {patch.get_gid()} {look} {patch.get_hatch()}: {numbers(outline)}"
     for part in axes.collections:
@@ -130,6 +130,13 @@ def axes_lines(axes: Any) -> Iterator[str]:
         yield f"text {text.get_text()} {text.get_fontweight()}: {numbers(text.get_position())}"
     if axes.get_legend() is not None:
         yield f"legend: {' | '.join(text.get_text() for text in axes.get_legend().get_texts())}"
+
+
+def without_closing(outline: Any) -> Any:
+    """Vertices (n, 2) without those at the end that stand at the first: rounding makes one or two of them."""
+    while len(outline) > 1 and np.allclose(outline[-1], outline[0], rtol=0.0, atol=1e-9 * np.abs(outline).max()):
+        outline = outline[:-1]
+    return outline
 
 
 def label_of(part: Any) -> str:
@@ -154,8 +161,8 @@ def compare(told: Iterable[str], approved: Iterable[str]) -> None:
 
 
 def in_one_line(text: str) -> str:
-    """A text whose ends of lines are words."""
-    return text.replace("\r", "\\r").replace("\n", "\\n")
+    """A text whose ends of lines are words, and of whose hashes is told that they are: of what rounding reaches."""
+    return HASH.sub("a hash", text.replace("\r", "\\r").replace("\n", "\\n"))
 
 
 def is_same(one: str, other: str) -> bool:

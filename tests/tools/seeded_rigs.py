@@ -8,6 +8,7 @@ from __future__ import annotations
 import datetime
 import json
 import random
+import re
 import tempfile
 import zlib
 from collections import defaultdict
@@ -35,6 +36,7 @@ COUNT = -(-len(ALL) // TOGETHER)
 RIGS = {FIRST + WORLDS * k: ALL[k::COUNT] for k in range(COUNT)}
 # of these a last digit changes the whole, or the time of day, or the lot by which a node without memory is numbered
 LEFT_OUT = "sha256", "hash", "digest", "seal", "key", "utc", "age_s", "sequence", "numbered", "detail"
+NUMBER = re.compile(r"\d+(\.\d+)?")
 NOT_ASKED = "column", "setup"  # a second of drawing; ages by the time of day
 
 
@@ -129,12 +131,12 @@ def answer_of(rig: InlineRig, path: str) -> dict[str, Any]:
 
 
 def sums_of(answer: Mapping[str, Any]) -> list[float]:
-    """Figures of the numbers of an answer, and a checksum of its names and words."""
+    """Figures of the numbers of an answer, and a checksum of its names and words, without the numbers in these."""
     numbers, words = [], []
     for path, value in leaves_of(answer):
         is_number = isinstance(value, int | float)
         numbers += [float(value)] if is_number else []
-        words.append(path if is_number else f"{path} {value}")
+        words.append(path if is_number else NUMBER.sub("#", f"{path} {value}"))
     return [*weighed(numbers), zlib.crc32("\n".join(words).encode())]
 
 
