@@ -15,7 +15,7 @@ from node.kernels.arithmetic.jit import allocating_kernel, kernel, kernel_consta
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
-FIRST, STATE = kernel_constant(0), kernel_constant(4)  # of the columns of a block
+STATE = kernel_constant(4)  # columns of a block; that loops over them begin at a literal zero makes them vectors
 
 
 @kernel
@@ -32,12 +32,12 @@ def eliminate_path(diagonal: Array, tied: Array, coupled: Array, ends: Places, t
     """
     for j in range(len(diagonal) - 1, -1, -1):
         factorise_block(diagonal[j])
-        divide_columns(diagonal[j], tied[j], FIRST, STATE)
-        divide_columns(diagonal[j], coupled[j], FIRST, ends[j])
+        divide_columns(diagonal[j], tied[j], 0, STATE)
+        divide_columns(diagonal[j], coupled[j], 0, ends[j])
         divide_columns(diagonal[j], coupled[j], tail, coupled.shape[2])
         if j > 0:
-            take_columns(tied[j], tied[j], diagonal[j - 1], FIRST, STATE)
-            take_columns(tied[j], coupled[j], coupled[j - 1], FIRST, ends[j])
+            take_columns(tied[j], tied[j], diagonal[j - 1], 0, STATE)
+            take_columns(tied[j], coupled[j], coupled[j - 1], 0, ends[j])
             take_columns(tied[j], coupled[j], coupled[j - 1], tail, coupled.shape[2])
 
 
@@ -65,9 +65,9 @@ def take_columns(one: Array, other: Array, out: Array, begin: int, end: int) -> 
 def reduce_right(diagonal: Array, tied: Array, right: Array) -> None:
     """Bring further right sides (s + 1, 4, r) into the form that ``substitute_path`` takes, in place."""
     for j in range(len(diagonal) - 1, -1, -1):
-        divide_columns(diagonal[j], right[j], FIRST, right.shape[2])
+        divide_columns(diagonal[j], right[j], 0, right.shape[2])
         if j > 0:
-            take_columns(tied[j], right[j], right[j - 1], FIRST, right.shape[2])
+            take_columns(tied[j], right[j], right[j - 1], 0, right.shape[2])
 
 
 @kernel

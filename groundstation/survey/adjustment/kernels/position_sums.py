@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.kernels.path_elimination import (
-    FIRST,
     STATE,
     add_outer,
     add_product,
@@ -56,7 +55,7 @@ def position_sums(
         if j > 0:
             passed[:] = 0.0
             take_image(grown[j], steps[j], passed)
-            take_columns(steps[j], passed, grown[j - 1], FIRST, STATE)
+            take_columns(steps[j], passed, grown[j - 1], 0, STATE)
     cov, change = np.zeros((4, 4)), np.zeros((4, 4))
     crossed, its_change = np.zeros((3, 4)), np.zeros((3, 4))  # of what was summed, with the state here
     summed = np.zeros((2, 3))
