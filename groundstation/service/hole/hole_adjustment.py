@@ -125,7 +125,7 @@ class HoleAdjustment:
     def path_of(self, mds: Array, collar: Direction) -> PathPrior:
         """What is known of the path before."""
         tangents = tangents_of([collar])
-        cov, _, _ = tangent_errors(collar, tangents[0])
+        cov, _ = tangent_errors(collar, tangents[0])
         return PathPrior(
             np.concatenate([[0.0], mds]),
             tangents[0],

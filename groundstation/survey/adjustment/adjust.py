@@ -62,7 +62,9 @@ def adjust_hole(
     if len(now.extra) != len(extra.std):
         now = replace(now, extra=np.zeros(len(extra.std)))
     known = string_information(string, extra) if known is None else known
-    is_settled = now.is_learnt  # where it begins: so what is known of each unknown beside the others is no matter
+    is_settled = now.is_learnt
+    # what is known of each unknown beside the others is no matter then, and far too strict where stations are near
+    by_decrement = is_settled or are_many(looks)
     learning, turns, step = VarianceLearning(is_done=is_settled), poor_yaws(looks, len(path.md)), math.inf
     leading: LinearSolution | None = None  # whose equations lead on, where one of before does
     alone = None if len(known) < WIDE or are_many(looks) else lone_looks(looks, string, known)
@@ -74,7 +76,7 @@ def adjust_hole(
             found = Adjusted(looks, string, path, extra, ended, linear, solution, known)
         else:
             found = _step_without(alone, looks, string, path, extra, known, now, linear, turns)
-        before, step = step, found.solution.decrement if is_settled else found.solution.step
+        before, step = step, found.solution.decrement if by_decrement else found.solution.step
         if not np.isfinite(step):
             raise np.linalg.LinAlgError("expected a step of the unknowns, got numbers that are none")
         leading = found.solution if is_settled and are_many(looks) and step < NEARER * before else None

@@ -16,7 +16,6 @@ from groundstation.survey.adjustment.kernels.observations import (
     weigh_down,
 )
 from groundstation.survey.adjustment.kernels.path_elimination import (
-    eliminate_few,
     eliminate_path,
     reduce_right,
     substitute_path,
@@ -69,12 +68,12 @@ def solve_equations(
     size, own = len(known), coupled[:, :, -1]
     whole = in_common[:size, :size].copy()
     if size < WIDE:
-        eliminate_path(diagonal, tied, coupled)
+        eliminate_path(diagonal, tied, coupled, *whole_columns(coupled))
         wide = coupled.reshape(-1, coupled.shape[2])
         in_common -= wide.T @ wide
     else:
         ends = tube_columns(looks, len(diagonal), linear.places)
-        eliminate_few(diagonal, tied, coupled, ends, linear.gravity_at)
+        eliminate_path(diagonal, tied, coupled, ends, linear.gravity_at)
         take_squares(coupled, ends, linear.gravity_at, in_common)
     left = InCommon(in_common[:size, :size], in_common[:size, size])
     states = (own - coupled[:, :, :size] @ left.step)[:, :, None].copy()
@@ -83,6 +82,12 @@ def solve_equations(
     return LinearSolution(
         diagonal, tied, coupled[:, :, :size], left, states[:, :, 0], gain, equations.at_station, whole
     )
+
+
+def whole_columns(coupled: Array) -> tuple[Places, int]:
+    """All columns of what is coupled (s + 1, 4, r), as ``eliminate_path`` takes them: none of them is zero."""
+    width = coupled.shape[2]
+    return np.full(len(coupled), width), width
 
 
 def tube_columns(looks: Looks, count: int, places: Places) -> Places:
@@ -105,7 +110,7 @@ def take_squares(coupled: Array, ends: Places, tail: int, in_common: Array) -> N
 
     Parameters
     ----------
-    ends, tail : see ``eliminate_few``
+    ends, tail : see ``eliminate_path``
     """
     for begin in range(0, len(coupled), TOGETHER):
         some, end = coupled[begin : begin + TOGETHER], int(ends[begin])

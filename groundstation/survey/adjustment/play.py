@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.kernels.observations import add_looks
+from groundstation.survey.adjustment.looks import OF_TUBE
+from groundstation.survey.adjustment.normal_equations import WIDE
 
 if TYPE_CHECKING:
     from groundstation.survey.adjustment.adjusted import Adjusted
@@ -43,8 +45,7 @@ def told_by_all(found: Adjusted, weights: Array) -> float:
 
     As normal equations with these weights it costs a hundredth of what it does look by look.
     """
-    looks, linear, cov = found.looks, found.linear, found.common_cov
-    size, count = len(cov), len(found.path.md)
+    looks, linear, size, count = found.looks, found.linear, len(found.known), len(found.path.md)
     own, coupled = np.zeros((count, 2, 2)), np.zeros((count, 2, size + 1))
     in_common = np.zeros((size + 1, size + 1))
     add_looks(
@@ -55,7 +56,24 @@ def told_by_all(found: Adjusted, weights: Array) -> float:
     # the covariance is R R^T: times B^T (N B + 2 C) its trace is that of (B R)^T (N B + 2 C) R
     rooted = found.solution.in_common.times_root(both.reshape(-1, size))
     of_path = np.sum(rooted * found.direction_columns.reshape(-1, size))
-    return float(np.sum(own * found.own_covs[:, :2, :2]) + of_path + np.sum(cov * in_common[:size, :size]))
+    return float(np.sum(own * found.own_covs[:, :2, :2]) + of_path) + _told_in_common(found, in_common[:size, :size])
+
+
+def _told_in_common(found: Adjusted, weights: Array) -> float:
+    """Trace of the covariance of what stations have in common times weights (p, p) of looks.
+
+    No look is of two tubes, so of many unknowns the covariance is worked out where a look may be alone.
+    """
+    begin, size = found.linear.gravity_at, len(weights)
+    if size < WIDE or found.linear.places.size != begin:
+        return float(np.sum(found.common_cov * weights))
+    root = found.common_root
+    tubes, place = root[:begin].reshape(-1, OF_TUBE, size), np.arange(begin // OF_TUBE)
+    own = weights[:begin, :begin].reshape(len(place), OF_TUBE, -1, OF_TUBE)[place, :, place]
+    with_ends = root @ root[begin:].T  # gravity, make-ups and further effects go with every tube
+    ends = weights[:, begin:] * with_ends
+    of_tubes = float(np.sum(own * (tubes @ np.swapaxes(tubes, 1, 2))))
+    return of_tubes + 2.0 * float(np.sum(ends[:begin])) + float(np.sum(ends[begin:]))
 
 
 def faster_play(tried: Sequence[tuple[float, float]]) -> float:

@@ -40,7 +40,7 @@ from groundstation.survey.adjustment.hypotheses import (
 )
 from groundstation.survey.adjustment.kernels.path_elimination import eliminate_path
 from groundstation.survey.adjustment.looks import FurtherEffects, Looks, PathPrior, StartingPoint, StringPrior
-from groundstation.survey.adjustment.normal_equations import linearise_all
+from groundstation.survey.adjustment.normal_equations import linearise_all, whole_columns
 from groundstation.survey.adjustment.play import PLAY_KNOWN_AS
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.sphere import bends_between, carried_bases
@@ -210,7 +210,7 @@ def path_squares(found: Adjusted) -> tuple[float, float]:
     """Weighted squares by which directions and curvatures stand off what is known of a path, and log |information|."""
     diagonal, tied, right = path_equations(found.path, found.now, found.linear.bases)
     off = right[:, :, None].copy()
-    eliminate_path(diagonal, tied, off)
+    eliminate_path(diagonal, tied, off, *whole_columns(off))
     return float(np.sum(off * off)), 2.0 * float(np.log(np.einsum("kaa->ka", diagonal)).sum())
 
 

@@ -15,7 +15,6 @@ from groundstation.survey.adjustment.kernels.observations import (
     weigh_down,
 )
 from groundstation.survey.adjustment.kernels.path_elimination import (
-    eliminate_few,
     eliminate_path,
     path_covariances,
     reduce_right,
@@ -54,8 +53,7 @@ def warm_adjustment() -> None:
     )  # fmt: skip
     mirror_upper(common, width)
     diagonal, tied, coupled = np.eye(4)[None].copy(), np.zeros((1, 4, 4)), np.zeros((1, 4, width + 1))
-    eliminate_path(diagonal, tied, coupled)
-    eliminate_few(np.eye(4)[None].copy(), tied, coupled.copy(), first, 6)
+    eliminate_path(diagonal, tied, coupled, first, 6)
     reduce_right(diagonal, tied, coupled)
     substitute_path(diagonal, tied, coupled)
     path_covariances(diagonal, tied, np.zeros((1, 4, 4)))

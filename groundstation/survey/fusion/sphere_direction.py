@@ -88,18 +88,16 @@ def on_sphere(direction: Direction) -> SphereDirection:
     return SphereDirection(tangent, jacobian @ direction.cov @ jacobian.T, Packed(direction.shared).under(jacobian))
 
 
-def tangent_errors(direction: Direction, tangent: Array) -> tuple[Array, Packed, Array]:
-    """Errors of the unit vector of any direction: own covariance (3, 3), lean columns, and vertical part (c,) of these.
+def tangent_errors(direction: Direction, tangent: Array) -> tuple[Array, Packed]:
+    """Errors of the unit vector of any direction: own covariance (3, 3), and columns (3, s).
 
     ``tangent`` (3,) is that unit vector, for directions whose errors lie in the plane of the lean.
     """
     if isinstance(direction, SphereDirection):
-        columns = direction.packed
-        lean = Packed.of_values(columns.values[:2], columns.places, columns.width)
-        own = direction.own if direction.bow is SURE else direction.own + direction.bow
-        return own, lean, columns.values[2]
-    columns, jacobian = Packed(direction.shared), tangent_jacobian(tangent)
-    return jacobian @ direction.cov @ jacobian.T, columns, (jacobian @ columns.values)[2].copy()
+        return direction.own if direction.bow is SURE else direction.own + direction.bow, direction.packed
+    lean, jacobian = Packed(direction.shared), tangent_jacobian(tangent)
+    values = np.concatenate([lean.values, (jacobian @ lean.values)[2:]])
+    return jacobian @ direction.cov @ jacobian.T, Packed.of_values(values, lean.places, lean.width)
 
 
 def polar_variances(tangents: Array, covs: Array) -> tuple[Array, Array, Array]:

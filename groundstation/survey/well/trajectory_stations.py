@@ -24,9 +24,9 @@ Array = npt.NDArray[np.float64]
 BLOCK = 64  # stations from mark to mark
 PLACES, VALUES = map(attrgetter, ("places", "values"))
 DEPTH_PLACES, DEPTH_VALUES = map(attrgetter, ("columns.places", "columns.values"))
-NONE: Final = Packed(np.zeros((2, 0)))
+NONE: Final = Packed(np.zeros((3, 0)))
 NOTHING: Final = np.zeros(0)
-OF_DIRECTION = ("own", "width", "count", "depths", "depth_var")  # fields that each station has by itself
+OWN = ("own", "width", "count", "depths", "depth_var")  # fields that each station has by itself
 NO_PLACES: Final = np.zeros(0, np.intp)
 
 
@@ -43,9 +43,8 @@ class TrajectoryStations:
         self.rows = np.zeros(FEWEST, ROW)
         self.directions: list[Direction] = []
         self.depths: list[StationDepth] = []
-        self._columns: list[Packed] = []  # (2, s), of each direction
+        self._columns: list[Packed] = []  # (3, s), of each direction
         self._depths_share = False  # whether any depth ever had columns
-        self._down: list[Array] = []  # and what those come to in the vertical, (c,) of those that are kept
 
     def __len__(self) -> int:
         return len(self.directions)
@@ -60,7 +59,6 @@ class TrajectoryStations:
         self.rows["md"][place] = md
         self.directions.insert(place, direction)
         self._columns.insert(place, NONE)
-        self._down.insert(place, NOTHING)
         self.depths.insert(place, EXACT)
 
     def append_all(self, stations: Sequence[tuple[float, Direction]], depths: Mapping[float, StationDepth]) -> None:
@@ -74,7 +72,6 @@ class TrajectoryStations:
             self.depths.append(depths.get(md, EXACT))
         self.rows["md"][count : count + more] = [md for md, _ in stations]
         self._columns += [NONE] * more
-        self._down += [NOTHING] * more
 
     def direct(self, places: Sequence[int], tangents: Array | None = None) -> None:
         """Compute the rows at some places that depend on their own direction alone.
@@ -92,14 +89,15 @@ class TrajectoryStations:
         rows = self.rows
         at = slice(places.start, places.stop) if isinstance(places, range) else np.array(places)
         rows["tangent"][at] = tangents
-        owns, widths, counts, of_depths, own_vars = map(rows.__getitem__, OF_DIRECTION)
+        found = []
         for place, direction, tangent in zip(places, directions, tangents, strict=True):
-            owns[place], columns, self._down[place] = tangent_errors(direction, tangent)
-            self._columns[place], by_depth = columns, self.depths[place].columns
-            widths[place] = max(columns.width, by_depth.width)
-            counts[place], of_depths[place] = len(columns.places), len(by_depth.places)
-            own_vars[place] = self.depths[place].own_var
+            (own, columns), depth = tangent_errors(direction, tangent), self.depths[place]
+            self._columns[place], by_depth = columns, depth.columns
+            width = max(columns.width, by_depth.width)
+            found.append((own, width, len(columns.places), len(by_depth.places), depth.own_var))
             self._depths_share |= bool(by_depth.width)
+        for name, values in zip(OWN, zip(*found, strict=True), strict=True):
+            rows[name][at] = values
 
     def shared_depth_vars(self) -> Array:
         """Variances (n, 3) of the positions by what their depths share, m^2; as of ``follow``, of those alone."""
@@ -115,9 +113,7 @@ class TrajectoryStations:
 
     def tangent_columns(self, place: int) -> Array:
         """Shared columns (3, s) of the tangent at a station."""
-        packed = self._columns[place]
-        values = np.concatenate([packed.values, self._down[place][None]])
-        return Packed.of_values(values, packed.places, packed.width).columns()
+        return self._columns[place].columns()
 
     def follow(self, sums: TrajectorySums, begin: int, end: int, *, with_columns: bool) -> Followed:
         """Continue ``sums`` from one place to another."""
@@ -129,8 +125,8 @@ class TrajectoryStations:
         depths, count, known = self.depths[begin : end + 1], end - begin, sums.passed.shape[1]
         widths = np.maximum(np.maximum.accumulate(rows["width"])[1:], known)
         places = np.concatenate([*map(PLACES, columns)]).astype(np.intp, copy=False)
-        lean = np.concatenate([*map(VALUES, columns)], axis=1)
-        down = np.concatenate(self._down[begin : end + 1])
+        values = np.concatenate([*map(VALUES, columns)], axis=1)
+        lean, down = values[:2], values[2]
         depth_places, by_depth = NO_PLACES, NOTHING
         if self._depths_share:
             depth_places = np.concatenate([*map(DEPTH_PLACES, depths)]).astype(np.intp, copy=False)

@@ -11,14 +11,15 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.arithmetic.jit import allocating_kernel, kernel
+from node.kernels.arithmetic.jit import allocating_kernel, kernel, kernel_constant
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
+STATE = kernel_constant(4)  # columns of a block; that loops over them begin at a literal zero makes them vectors
 
 
 @kernel
-def eliminate_path(diagonal: Array, tied: Array, coupled: Array) -> None:
+def eliminate_path(diagonal: Array, tied: Array, coupled: Array, ends: Places, tail: int) -> None:
     """Factorise the chain in place.
 
     Parameters
@@ -26,33 +27,16 @@ def eliminate_path(diagonal: Array, tied: Array, coupled: Array) -> None:
     diagonal : (s + 1, 4, 4), blocks of S; set to the lower Cholesky factors L_j of what is left of each
     tied : (s + 1, 4, 4), blocks of S between a station and the one above; set to L_j^-1 of them
     coupled : (s + 1, 4, p + 1), B with b as the last column; set to L_j^-1 of what is left
-    """
-    for j in range(len(diagonal) - 1, -1, -1):
-        factorise_block(diagonal[j])
-        divide_by_factor(diagonal[j], coupled[j])
-        divide_by_factor(diagonal[j], tied[j])
-        if j > 0:
-            take_product(tied[j], tied[j], diagonal[j - 1])
-            take_product(tied[j], coupled[j], coupled[j - 1])
-
-
-@kernel
-def eliminate_few(diagonal: Array, tied: Array, coupled: Array, ends: Places, tail: int) -> None:
-    """Factorise the chain in place where most of B is zero; the same as ``eliminate_path`` bit for bit.
-
-    Parameters
-    ----------
-    diagonal, tied, coupled : as of ``eliminate_path``
     ends : (s + 1,), columns of B from each on to before ``tail`` are zero there and further down; they do not grow
     tail : from which on any column may be other than zero
     """
     for j in range(len(diagonal) - 1, -1, -1):
         factorise_block(diagonal[j])
-        divide_by_factor(diagonal[j], tied[j])
+        divide_columns(diagonal[j], tied[j], 0, STATE)
         divide_columns(diagonal[j], coupled[j], 0, ends[j])
         divide_columns(diagonal[j], coupled[j], tail, coupled.shape[2])
         if j > 0:
-            take_product(tied[j], tied[j], diagonal[j - 1])
+            take_columns(tied[j], tied[j], diagonal[j - 1], 0, STATE)
             take_columns(tied[j], coupled[j], coupled[j - 1], 0, ends[j])
             take_columns(tied[j], coupled[j], coupled[j - 1], tail, coupled.shape[2])
 
@@ -81,9 +65,9 @@ def take_columns(one: Array, other: Array, out: Array, begin: int, end: int) -> 
 def reduce_right(diagonal: Array, tied: Array, right: Array) -> None:
     """Bring further right sides (s + 1, 4, r) into the form that ``substitute_path`` takes, in place."""
     for j in range(len(diagonal) - 1, -1, -1):
-        divide_by_factor(diagonal[j], right[j])
+        divide_columns(diagonal[j], right[j], 0, right.shape[2])
         if j > 0:
-            take_product(tied[j], right[j], right[j - 1])
+            take_columns(tied[j], right[j], right[j - 1], 0, right.shape[2])
 
 
 @kernel
@@ -104,16 +88,16 @@ def substitute_path(diagonal: Array, tied: Array, right: Array) -> None:
 @allocating_kernel
 def path_covariances(diagonal: Array, tied: Array, covs: Array) -> None:
     """Covariances (s + 1, 4, 4) of the states where what stations have in common is known, set."""
+    root, passed, spread = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
     for j in range(len(diagonal)):
-        root = np.eye(4)  # L_j^-T
-        divide_by_transposed(diagonal[j], root)
+        invert_transposed(diagonal[j], root)
         covs[j] = 0.0
-        take_image(-root, root.T, covs[j])
+        add_outer(root, root, covs[j])
         if j > 0:
-            passed, spread = np.zeros((4, 4)), np.zeros((4, 4))
+            passed[:], spread[:] = 0.0, 0.0
             take_image(root, tied[j], passed)  # from the state above
-            take_image(-passed, covs[j - 1], spread)
-            take_image(-spread, passed.T, covs[j])
+            add_product(passed, covs[j - 1], spread)
+            add_outer(spread, passed, covs[j])
 
 
 @kernel
@@ -130,14 +114,12 @@ def factorise_block(m: Array) -> None:
 
 
 @kernel
-def divide_by_factor(lower: Array, right: Array) -> None:
-    """Put L^-1 R in the place of R (4, r)."""
+def invert_transposed(lower: Array, out: Array) -> None:
+    """Set L^-T (4, 4)."""
     for a in range(4):
-        for i in range(a):
-            for b in range(right.shape[1]):
-                right[a, b] -= lower[a, i] * right[i, b]
-        for b in range(right.shape[1]):
-            right[a, b] /= lower[a, a]
+        for b in range(4):
+            out[a, b] = 1.0 if a == b else 0.0
+    divide_by_transposed(lower, out)
 
 
 @kernel
@@ -152,18 +134,27 @@ def divide_by_transposed(lower: Array, right: Array) -> None:
 
 
 @kernel
-def take_product(one: Array, other: Array, out: Array) -> None:
-    """Take M^T N, of (4, 4) and (4, r), from ``out``."""
-    for a in range(4):
-        for i in range(4):
-            for b in range(other.shape[1]):
-                out[a, b] -= one[i, a] * other[i, b]
-
-
-@kernel
 def take_image(one: Array, other: Array, out: Array) -> None:
     """Take M N, of (4, 4) and (4, r), from ``out``."""
     for a in range(4):
         for i in range(4):
             for b in range(other.shape[1]):
                 out[a, b] -= one[a, i] * other[i, b]
+
+
+@kernel
+def add_product(one: Array, other: Array, out: Array) -> None:
+    """Add M N to ``out``."""
+    for a in range(one.shape[0]):
+        for i in range(one.shape[1]):
+            for b in range(other.shape[1]):
+                out[a, b] += one[a, i] * other[i, b]
+
+
+@kernel
+def add_outer(one: Array, other: Array, out: Array) -> None:
+    """Add M N^T to ``out``; what is transposed is read as it lies, so that one form of it is compiled."""
+    for a in range(one.shape[0]):
+        for i in range(one.shape[1]):
+            for b in range(other.shape[0]):
+                out[a, b] += one[a, i] * other[b, i]

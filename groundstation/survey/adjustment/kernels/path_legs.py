@@ -11,7 +11,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.adjustment.kernels.path_elimination import divide_by_transposed
+from groundstation.survey.adjustment.kernels.path_elimination import divide_by_transposed, invert_transposed
 from node.kernels.arithmetic.jit import allocating_kernel, kernel
 
 Array = npt.NDArray[np.float64]
@@ -110,12 +110,10 @@ def leg_squares(
     off, root, carried, lever = np.empty(4), np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
     for k in range(len(squares)):
         leg_departure(k, go, tangents, bases, curvatures, off)
-        root[:] = 0.0
+        invert_transposed(diagonal[k + 1], root)
         for a in range(4):
-            root[a, a] = 1.0
             for b in range(4):
                 carried[a, b] = -tied[k + 1, a, b]
-        divide_by_transposed(diagonal[k + 1], root)
         divide_by_transposed(diagonal[k + 1], carried)
         square = of_errors = 0.0
         for a in range(4):

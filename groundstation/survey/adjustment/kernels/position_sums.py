@@ -11,9 +11,16 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.adjustment.kernels.path_elimination import divide_by_transposed, take_image
+from groundstation.survey.adjustment.kernels.path_elimination import (
+    STATE,
+    add_outer,
+    add_product,
+    invert_transposed,
+    take_columns,
+    take_image,
+)
 from groundstation.survey.path.kernels.copied_rows import copy_rows
-from node.kernels.arithmetic.jit import allocating_kernel, kernel
+from node.kernels.arithmetic.jit import allocating_kernel
 
 Array = npt.NDArray[np.float64]
 
@@ -35,10 +42,10 @@ def position_sums(
     count = len(diagonal)
     noises, steps = np.zeros((count, 4, 4)), np.zeros((count, 4, 4))  # E and F
     grown = np.zeros((count, 4, 4))  # change of what is left of each block
+    root, passed = np.empty((4, 4)), np.empty((4, 4))
     for j in range(count):
-        root = np.eye(4)
-        divide_by_transposed(diagonal[j], root)
-        add_product(root, root.T, noises[j])
+        invert_transposed(diagonal[j], root)
+        add_outer(root, root, noises[j])
         if j > 0:
             take_image(root, tied[j], steps[j])
     for j in range(count - 1, -1, -1):
@@ -46,13 +53,13 @@ def position_sums(
             for b in range(2):
                 grown[j, a, b] += of_looks[j, a, b]
         if j > 0:
-            passed = np.zeros((4, 4))
-            add_product(grown[j], steps[j], passed)
-            add_product(steps[j].T, passed, grown[j - 1])
+            passed[:] = 0.0
+            take_image(grown[j], steps[j], passed)
+            take_columns(steps[j], passed, grown[j - 1], 0, STATE)
     cov, change = np.zeros((4, 4)), np.zeros((4, 4))
     crossed, its_change = np.zeros((3, 4)), np.zeros((3, 4))  # of what was summed, with the state here
     summed = np.zeros((2, 3))
-    axes = np.zeros((3, 4))
+    axes, levers = np.zeros((3, 4)), np.zeros((3, 4))
     for j in range(count):
         by_grown, lost, turned = np.zeros((4, 4)), np.zeros((4, 4)), np.zeros((4, 4))
         add_product(noises[j], grown[j], by_grown)
@@ -75,8 +82,10 @@ def position_sums(
             out[j, 1, i] = here + summed[1, i] + 2.0 * halves[j] * its_both + halves[j] ** 2 * its_own
             summed[0, i] += 2.0 * wholes[j] * both + wholes[j] ** 2 * own
             summed[1, i] += 2.0 * wholes[j] * its_both + wholes[j] ** 2 * its_own
-        add_product(wholes[j] * axes, cov, crossed)
-        add_product(wholes[j] * axes, change, its_change)
+        for i in range(3):
+            levers[i, 0], levers[i, 1] = wholes[j] * axes[i, 0], wholes[j] * axes[i, 1]
+        add_product(levers, cov, crossed)
+        add_product(levers, change, its_change)
 
 
 @allocating_kernel
@@ -88,10 +97,10 @@ def carry_covariance(cov: Array, change: Array, step: Array, turned: Array, nois
     add_product(step, change, by_change)
     copy_rows(noise, cov)
     copy_rows(lost, change)
-    add_product(half, step.T, cov)
-    add_product(half, turned.T, change)
-    add_product(by_turn, step.T, change)
-    add_product(by_change, step.T, change)
+    add_outer(half, step, cov)
+    add_outer(half, turned, change)
+    add_outer(by_turn, step, change)
+    add_outer(by_change, step, change)
 
 
 @allocating_kernel
@@ -99,15 +108,6 @@ def carry_crossed(crossed: Array, change: Array, step: Array, turned: Array) -> 
     """Carry a covariance (3, 4) of sums with a state, and its change, over the same step, in place."""
     before, its_before = crossed.copy(), change.copy()
     crossed[:], change[:] = 0.0, 0.0
-    add_product(before, step.T, crossed)
-    add_product(before, turned.T, change)
-    add_product(its_before, step.T, change)
-
-
-@kernel
-def add_product(one: Array, other: Array, out: Array) -> None:
-    """Add M N to ``out``."""
-    for a in range(one.shape[0]):
-        for i in range(one.shape[1]):
-            for b in range(other.shape[1]):
-                out[a, b] += one[a, i] * other[i, b]
+    add_outer(before, step, crossed)
+    add_outer(before, turned, change)
+    add_outer(its_before, step, change)
