@@ -179,6 +179,16 @@ def test_a_frame_is_pythons_byte_for_byte(
     assert parsed_in_c(library, frame) == parsed_in_python(frame) == (numbers, [list(entry) for entry in entries])
 
 
+@needs_gcc
+@pytest.mark.parametrize("length", [0, 1, 31, 32, 254, 255, 256, 257, 1500])
+def test_a_payload_has_the_shortest_form_of_its_length(library: ctypes.CDLL, length: int) -> None:
+    numbers, payload = (1, 2**24, 3, 4, 5, 6), bytes(range(256)) * 6
+    kept = ctypes.create_string_buffer(payload[:length], max(length, 1))
+    entry, room = Entry(7, ctypes.cast(kept, ctypes.c_void_p), length), Guarded()
+    found = library.link_pack(ctypes.byref(Header(*numbers)), ctypes.byref(entry), 1, room.begin, ROOM)
+    assert room.content(found) == pack_frame(numbers, [(7, payload[:length])])
+
+
 def with_checksum(body: bytes) -> bytes:
     return zlib.crc32(body).to_bytes(4, "little") + body
 

@@ -120,6 +120,22 @@ def test_it_is_the_filter_that_python_has(library: ctypes.CDLL) -> None:
             assert stepped == UNKNOWN if math.isnan(told) else stepped == pytest.approx(1e6 * told, abs=50.0)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_rig_time_runs_at_the_rate_that_is_told(library: ctypes.CDLL, seed: int) -> None:
+    """Over an hour, before and after now: a rate has steps of 1e-9, a time of 1 us."""
+    pair = Pair(library, seed)
+    for _ in followed(pair):
+        pass
+    local, hour = pair.own(pair.now), 3_600_000_000
+    told = round(1e9 / pair.other_rate) / 1e9
+    drift = pair.ask("rig_rate") / 1e9 - told  # of the neighbour's clock against the own
+    assert min(abs(drift), abs(told - 1.0)) > 1e-6
+    rate = (1.0 + drift) * told
+    now = pair.ask("rig_from_local", local)
+    for apart in (hour, -hour):
+        assert pair.ask("rig_from_local", local + apart) - now == pytest.approx(apart * rate, abs=hour * 1.5e-9 + 3.0)
+
+
 def test_time_is_carried_between_exchanges_with_the_drift_that_was_seen(library: ctypes.CDLL) -> None:
     pair = Pair(library, 3)
     for _ in followed(pair):

@@ -10,7 +10,14 @@ from typing import Any
 import pytest
 
 from node.firmware.tube_settings import PassedTube
-from node.process.tube_process import MAX_CLOCK_STD, REPORT_EVERY, RESENT_TOGETHER, SYNCHRONISED_STD, TubeProcess
+from node.process.tube_process import (
+    MAX_CLOCK_STD,
+    REPORT_EVERY,
+    RESENT_TOGETHER,
+    SYNCHRONISED_STD,
+    TubeProcess,
+    jump_of,
+)
 from telemetry.messages import Aiding, Event, NodeFlag, NodeMode, NodeState, Severity, Side, StaticRecord
 from telemetry.presentation.msgpack_codec import encode_message
 
@@ -170,3 +177,12 @@ def test_what_must_not_be_lost_waits_for_its_save_and_surveys_stay_in_the_log(is
     process_of(_log=log, endpoint=SimpleNamespace(mail=mail), _saver=saver)._keep(message, 5.5)
     assert done == [*([] if kind == "event" else [9]), *(["hold"] if is_spent else []), (message, 5.5)]
     assert saver.due
+
+
+@pytest.mark.parametrize(
+    ("arguments", "seconds"),
+    [({"by_s": 0.35}, 0.35), ({"by_s": -2}, 2.0), ({"by_s": -3600.0}, 3600.0), ({"by_s": 1e9}, 3600.0), ({}, 3600.0),
+     ({"by_s": "long"}, 3600.0), ({"by_s": None}, 3600.0)],
+)  # fmt: skip
+def test_a_clock_is_doubted_by_what_it_jumped_and_by_an_hour_at_most(arguments: dict[str, Any], seconds: float) -> None:
+    assert jump_of(Event(3, 1, 0.0, Severity.WARNING, "clock_jumped", arguments)) == seconds

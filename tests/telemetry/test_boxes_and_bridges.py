@@ -224,3 +224,14 @@ def test_a_port_of_a_stepper_keeps_all_that_a_step_sends(
     assert rates.nominal == 125000
     medium.close()
     assert port.closed == 1
+
+
+async def test_a_box_that_was_closed_is_not_waited_at() -> None:
+    """Neither at once nor when the word of its end has come and gone."""
+    box: Inbox[int] = Inbox()
+    box.close()
+    async with asyncio.timeout(20.0):
+        await box.wait()
+        await asyncio.sleep(0.0)
+        await box.wait()
+        assert await box.get() is None
