@@ -51,7 +51,6 @@ def test_rigs_on_a_bus_are_named_once_in_order() -> None:
 
 @pytest.mark.parametrize("change", [{}, {"blocks": 3}])
 def test_a_string_stands_from_each_stop_until_it_drills_again_or_to_the_end(change: dict[str, Any]) -> None:
-    """Where nothing is added between two, the next drilling begins at the very end of a stop."""
     tables = change_sections(STRING, schedule=change)
     if change:
         tables = change_sections(tables, rig={"tubes_at_start": 2}, rotation={"advance_m": 1.0})
