@@ -245,3 +245,35 @@ def test_a_wall_of_columns_each_of_which_leans_its_own_way(tmp_path: Path) -> No
         "ratio": None,
         "memory_mb": 31.4,
     }
+
+
+class EchoPort:
+    """A port whose other end answers from the ``deaf``-th frame on, at once."""
+
+    def __init__(self, module: Any, deaf: int) -> None:
+        self.module, self.deaf, self.sent = module, deaf, list[int]()
+
+    def listen(self, call: Any) -> None:
+        self.call = call
+
+    def send(self, frame: Any) -> None:
+        self.sent.append(frame.content.header.number)
+        bare = self.module.LinkFrame(frame.content.header, [])
+        self.call(bare if len(self.sent) <= self.deaf else frame.content)
+
+
+@pytest.mark.parametrize("deaf", [0, 2])
+def test_frames_go_there_and_back_one_after_the_other(deaf: int) -> None:
+    can = bench("can")
+    can.TURN = can.PATIENCE = 0.001
+    port = EchoPort(can, deaf)
+    pinger = can.Pinger(port)
+    pinger.meet()
+    assert port.sent == list(range(1, deaf + 2))
+    pinger.exchange(4)
+    assert port.sent == list(range(1, deaf + 6))
+    port.deaf = 10**6
+    for act in (pinger.meet, lambda: pinger.exchange(1)):
+        with pytest.raises(RuntimeError, match=r"^no answer$"):
+            act()
+    assert len(port.sent) == deaf + 5 + can.TRIES + 1

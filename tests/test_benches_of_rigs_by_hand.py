@@ -7,6 +7,7 @@ import random
 import statistics
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -208,6 +209,10 @@ def test_the_library_s_filter_turns_its_horizontal_errors_and_takes_a_yaw() -> N
     gain = P @ row.T / (row @ P @ row.T + 2e-5 + floor)
     np.testing.assert_allclose(calls.ekf.P, P - gain @ row @ P, rtol=1e-9, atol=1e-15)
     assert statistics.median(calls.row[0]) == 0.0
+    clock = Clock("thread_time")
+    node.time = clock.time
+    calls.step = clock.taking(1.0, 4.0)
+    assert (calls.seconds(), clock.calls) == (2.5, 2)
 
 
 @pytest.mark.slow
@@ -219,3 +224,29 @@ def test_the_callers_of_a_step_end_with_one_yaw() -> None:
     assert ratios["node by node, from Python"]["ratio"] == 1.0
     peer = ratios["node by node, from Python"]["ours"]
     assert all((row["peer"], row["ratio"]) == (peer, peer / row["ours"]) for row in ratios.values())
+
+
+def test_a_string_in_one_process_is_read_while_it_drills(tmp_path: Path) -> None:
+    inline = bench("inline")
+    told: list[Any] = []
+
+    class Rig:
+        stepper: Any = SimpleNamespace(builders={1: print})
+
+        def __init__(self, *given: Any) -> None:
+            told.append(given)
+
+        def run(self, follow: Any) -> None:
+            follow(SimpleNamespace(begin=0.0, end=60.0, rig_time=30.0))
+            assert isinstance(self.stepper, inline.Counting)
+            assert self.stepper.builders == {1: print}
+
+        def close(self) -> None:
+            told.append("closed")
+
+    inline.InlineRig, inline.read_world, inline.settings_of = Rig, lambda job: job.scenario.name, lambda *_: {"a": 1}
+    meter, counting = inline.drilled_inline(tmp_path / "s.toml", tmp_path / "run")
+    assert (meter.told, meter.length, len(meter.marks)) == (1, 60.0, 1)
+    assert isinstance(counting, inline.Counting)
+    assert told == [("s.toml", {"a": 1}, "rig-1", tmp_path / "run"), "closed"]
+    assert (tmp_path / "run").is_dir()
