@@ -53,7 +53,7 @@ def rate_about(at: float) -> float:
 
 
 def drill_late(rig: Rig, lateness: Callable[[], float]) -> None:
-    """Some turns of a string whose sensor is read late, by less than what costs a cycle."""
+    """Some turns of a string whose sensor is read late, by less than what costs a cycle, over a line that takes long."""
     world, begun = rig.world, rig.world.now
     due, ended = begun + PERIOD, begun
 
@@ -63,10 +63,11 @@ def drill_late(rig: Rig, lateness: Callable[[], float]) -> None:
         world.run(max(read_at - world.now, 0.0))
         begin = window_begin(ended, world.now)
         mean = (turned(world.now - begun) - turned(begin - begun)) / (world.now - begin)
-        ended, due = world.now, next_due(due, world.now)
+        ended, due, marked_us = world.now, next_due(due, world.now), world.now_us
+        world.run(0.5 * lateness())
         noise = world.random.normal(0.0, 1.0, 6)
         force = (3e-3 * noise[3], 0.34 + 3e-3 * noise[4], -9.8 + 3e-3 * noise[5])
-        rig.chip.read_sensor((*(1e-4 * noise[:2]), mean + 1e-4 * noise[2]), force, world.now_us)
+        rig.chip.read_sensor((*(1e-4 * noise[:2]), mean + 1e-4 * noise[2]), force, marked_us)
         rig.yaw = 1.0 + turned(world.now - begun)
         world.after_cycle(world.now)
 
