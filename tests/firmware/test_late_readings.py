@@ -53,7 +53,7 @@ def rate_about(at: float) -> float:
 
 
 def drill_late(rig: Rig, lateness: Callable[[], float]) -> None:
-    """Some turns of a string whose sensor is read late, by less than what costs a cycle, over a line that takes long."""
+    """Some turns of a string whose sensor is read late, by less than what costs a cycle, on a slow line."""
     world, begun = rig.world, rig.world.now
     due, ended = begun + PERIOD, begun
 
