@@ -287,20 +287,22 @@ static void say(struct chip_node *node, int64_t says)
     }
 }
 
-void node_on_readings(struct chip_node *node, int64_t readings[BORECHAIN_IMUS][NODE_READING], int64_t now_us)
+void node_on_readings(struct chip_node *node, int64_t readings[BORECHAIN_IMUS][NODE_READING], int64_t ended_us)
 {
     int64_t moment[8], says;
-    const int64_t begun_us = node->cycle_us != 0 && now_us - node->cycle_us < PERIOD_US * 3 / 2 ? node->cycle_us
-                                                                                                 : now_us - PERIOD_US;
+    const int64_t begun_us = node->cycle_us != 0 && ended_us - node->cycle_us < PERIOD_US * 3 / 2
+                                 ? node->cycle_us
+                                 : ended_us - PERIOD_US;
     const bool was_still = node->record.filter.still_cycles > 0;
     int64_t stepped;
-    node->now_us = node->cycle_us = now_us;
+    node->cycle_us = ended_us;
+    node->now_us = ended_us > node->now_us ? ended_us : node->now_us;
     if (is_dated(node) && !node->is_announced) {
         announce(node);
     }
     stepped = is_dated(node) ? clock_take_step(&node->clock) : 0;
     moment[0] = q28_of_us(begun_us);
-    moment[1] = q28_of_us(now_us);
+    moment[1] = q28_of_us(ended_us);
     moment[2] = node->has_neighbour[NODE_UPPER] ? 1 : 0;
     moment[3] = node->kept.hops;
     moment[4] = node_var_q56(node_clock_var(node));

@@ -98,8 +98,8 @@ bool node_begin(
     const struct slot_board *flash,
     uint32_t nonce,
     int64_t now_us);
-/* A cycle has ended: one row an IMU, in the formats of the step. */
-void node_on_readings(struct chip_node *node, int64_t readings[BORECHAIN_IMUS][NODE_READING], int64_t now_us);
+/* A cycle ended at a time that may have passed: one row an IMU, in the formats of the step. */
+void node_on_readings(struct chip_node *node, int64_t readings[BORECHAIN_IMUS][NODE_READING], int64_t ended_us);
 void node_on_frame(
     struct chip_node *node,
     enum node_side side,

@@ -40,6 +40,7 @@
 #define MARK 0xB5u
 #define NUMBERS 7u
 #define WINDOW_STD (INT64_C(1) << 19)        /* s, Q28: 2 ms, of the window of a reading against its cycle */
+#define TRANSFER_SHARE 77                    /* s, Q28, a microsecond: its part 1/sqrt(12), evenly within a transfer */
 
 struct joint {
     struct slcan_line line;
@@ -50,6 +51,7 @@ struct joint {
 struct sensor {
     uint8_t bytes[8u * NUMBERS + 1u];
     uint32_t length;
+    int64_t begun_us; /* when the mark came */
     bool is_begun;
 };
 
@@ -185,13 +187,15 @@ static void speak_at(uint32_t side, uint32_t now)
 
 /* The sensor */
 
+/* A cycle ends when its mark comes, not when all of it is here: a line of single bytes takes 5 ms, and 150 where the
+ * processor is kept from it. How late the mark itself was then is not known better than that. */
 static void take_cycle(void)
 {
     int64_t readings[BORECHAIN_IMUS][NODE_READING];
     memset(readings, 0, sizeof readings);
     memcpy(readings[0], sensor.bytes, 8u * NUMBERS);
-    readings[0][9] = WINDOW_STD;
-    node_on_readings(&node, readings, now_us());
+    readings[0][9] = WINDOW_STD + (now_us() - sensor.begun_us) * TRANSFER_SHARE;
+    node_on_readings(&node, readings, sensor.begun_us);
 }
 
 static void hear_sensor(void)
@@ -201,6 +205,7 @@ static void hear_sensor(void)
         const uint8_t byte = (uint8_t)REGISTER(UART(SENSOR) + UART_DATA);
         if (!sensor.is_begun) {
             sensor.is_begun = byte == MARK;
+            sensor.begun_us = now_us();
             sensor.length = 0u;
             continue;
         }

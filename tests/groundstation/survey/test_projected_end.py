@@ -109,7 +109,8 @@ def test_it_is_what_draws_of_the_process_do_in_space() -> None:
         share = np.mean(np.hypot(*(ends - found.ends.offset).T) <= found.foreseen.radius_of(chance, found.ends.offset))
         assert share == pytest.approx(chance, abs=0.025)
     assert found.within == pytest.approx(np.mean(np.hypot(*ends.T) <= found.limit), abs=0.02)
-    assert found.distance_of(0.95) == pytest.approx(np.quantile(np.hypot(*ends.T), 0.95), rel=0.06)
+    for chance in (0.95, 0.5, 0.95):  # what was asked before is not the answer to another chance
+        assert found.distance_of(chance) == pytest.approx(np.quantile(np.hypot(*ends.T), chance), rel=0.06)
 
 
 def test_the_cone_opens_to_the_end_and_its_last_point_is_the_end() -> None:
