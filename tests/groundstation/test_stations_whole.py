@@ -258,9 +258,11 @@ def lasting(answer: Any) -> Iterator[str]:
     return (line for line in plain(leaves(answer)) if not PASSING.search(line))
 
 
-@pytest.mark.slow
-def test_a_ground_station_that_is_started_again_answers_what_the_first_one_did(tmp_path: Path) -> None:
-    rig = planned(tmp_path)
+@pytest.mark.parametrize("make", [walled, pytest.param(planned, marks=pytest.mark.slow)])
+def test_a_ground_station_that_is_started_again_answers_what_the_first_one_did(
+    tmp_path: Path, make: Callable[[Path], Rig]
+) -> None:
+    rig = make(tmp_path)
     rig.ground.operator.order("north", {"action": "tell", "angle_deg": "11", "sigma_deg": "0.3"}, "anna")
     rig.run(3.0)
     before = {path: list(lasting(rig.ask(path))) for path in KEPT}

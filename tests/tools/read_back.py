@@ -1,7 +1,7 @@
 """What a room makes, told line by line: every figure of an answer, every stroke of a drawing, as it was approved.
 
 Words must be the same; numbers may differ by rounding, as they do between processors. The files in `tests/data/whole`
-were read beside the calculations of the tests that use them, and are written anew by running the test's file.
+were read beside the calculations of the tests that use them, and are written anew as CONTRIBUTING.md says.
 """
 
 from __future__ import annotations
