@@ -123,3 +123,10 @@ def test_a_secret_that_was_changed_by_hand_is_refused_in_a_line(folder: Path, ol
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(KeyFileError, match=told):
         read_secret(folder)
+
+
+def test_a_role_that_is_none_is_refused_before_anything_is_written(folder: Path) -> None:
+    before = (folder / rig_keys.SECRET_FILE).read_bytes()
+    with pytest.raises(KeyFileError, match="person guest: expected a role of operator, driller, got 'viewer'"):
+        rig_keys.add_person(folder, "guest", "viewer", NOW)
+    assert (folder / rig_keys.SECRET_FILE).read_bytes() == before

@@ -48,6 +48,10 @@ class InlineRig:
     native : the joints are on CAN's native profile, which rounds cyclic messages to the steps of their signals
     disk_of : disk of the process of an address
     keys : folder of the rig's keys; without it everybody is believed
+
+    Attributes
+    ----------
+    seal_depth : what the source of the depth makes of its readings
     """
 
     def __init__(
@@ -72,7 +76,7 @@ class InlineRig:
             BASE: partial(GroundProcess, config, lot, disk_of(BASE)),
             ENCODER: lambda: self._build_encoder(private_folder(folder, "encoder"), keys, disk_of(ENCODER), lot),
         }
-        self._seal_depth = depth_sealer(keys)
+        self.seal_depth = depth_sealer(keys)
         block_key = None if key_file is None else read_key(key_file)
         for tube in range(1, world.scenario.tubes + 1):
             place = private_folder(folder, f"tube-{tube}")
@@ -113,7 +117,7 @@ class InlineRig:
             show(progress)
 
         with rare_collection():
-            Scheduler(self.world, self.stepper, follow, speed, cued=True, seal_depth=self._seal_depth).run()
+            Scheduler(self.world, self.stepper, follow, speed, cued=True, seal_depth=self.seal_depth).run()
 
     @property
     def is_begun(self) -> bool:

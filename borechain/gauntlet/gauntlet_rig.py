@@ -7,12 +7,14 @@ import itertools
 import math
 import tempfile
 from collections.abc import Callable, Iterable
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from borechain.drilling.inline import InlineRig
+from borechain.gauntlet.rig_keyring import RigKeyring
 from groundstation.service.process.ground_process import GroundProcess
+from node.process.node_host import seals_at
 from node.process.tube_process import TubeProcess
 from sim.errors import RigError
 from sim.gauntlet.fault import EVERYBODY, TUBES, Step
@@ -20,6 +22,7 @@ from sim.gauntlet.faulty_channel import FaultyChannel
 from sim.gauntlet.faulty_disk import FaultyDisk, PowerCutError
 from sim.gauntlet.faulty_stepper import FaultyStepper
 from sim.gauntlet.faulty_world import CALM_S, CALMED, DRILLED_IN, MINUTE, TUBE_LENGTH, FaultyWorld
+from sim.gauntlet.key_faults import heal_keys
 from sim.rig.scheduler import Scheduler
 from sim.world.random_streams import RandomStream, random_stream
 from telemetry.messages import BASE, Side
@@ -65,18 +68,28 @@ class GauntletRig:
     disks : of every process
     settings : of the ground station
     seed : of links and lots
-    folder : new; holds the key of the rig and nothing else
+    folder : new; holds the keys of the rig and nothing else
+    sealed : joints and messages are sealed, so that keys can fail
     """
 
     def __init__(
-        self, world: FaultyWorld, disks: dict[int, FaultyDisk], settings: dict[str, Any], seed: int, folder: Path
+        self,
+        world: FaultyWorld,
+        disks: dict[int, FaultyDisk],
+        settings: dict[str, Any],
+        seed: int,
+        folder: Path,
+        *,
+        sealed: bool = False,
     ) -> None:
         self.world = world
+        self._keyring = RigKeyring(folder / "keys") if sealed else None
+        keys = None if self._keyring is None else self._keyring.folder
         self._disks = dict(disks)
         self._settled = dict(disks)
         lots = random_stream(seed, RandomStream.LOTS)
         self.inline = InlineRig(
-            world, settings, "rig-1", folder, lambda below: int(lots.integers(below)), disk_of=self.disk
+            world, settings, "rig-1", folder, lambda below: int(lots.integers(below)), disk_of=self.disk, keys=keys
         )
         self.stepper = self.inline.stepper = FaultyStepper(self.inline.stepper.builders, world, self.cut)
         self._builders = dict(self.stepper.builders)
@@ -93,7 +106,7 @@ class GauntletRig:
         self._numbers = {address: address for address in disks}  # that the processes in their places give themselves
         self._spoke_until: dict[int, float] = {}  # s, by number
         self._look_at = world.begin
-        self.scheduler = Scheduler(world, self.stepper, self.stepper.follow)
+        self.scheduler = Scheduler(world, self.stepper, self.stepper.follow, seal_depth=self.inline.seal_depth)
         medium = world.scenario.medium
         self.channel = FaultyChannel(seed, medium.latency, medium.jitter, medium.loss, medium.duplicate)
         self.scheduler.channel = self.channel
@@ -108,6 +121,13 @@ class GauntletRig:
         """The ground station, where it has power."""
         process = self.stepper.processes.get(BASE)
         return process if isinstance(process, GroundProcess) else None
+
+    @property
+    def keys(self) -> RigKeyring:
+        """Keys of a rig that is sealed."""
+        if self._keyring is None:
+            raise TypeError("expected a sealed rig, got one without keys")
+        return self._keyring
 
     def cut(self, address: int) -> None:
         """Cut the power of a process, if it has any."""
@@ -200,6 +220,8 @@ class GauntletRig:
         """Give everything power and a working disk; the crew answers what stands."""
         self.repaired = True
         self.world.depth_hidden, self.world.depth_error = False, 0.0
+        if self._keyring is not None:
+            heal_keys(self)
         for address in EVERYBODY:
             self._disks[address].refusal, self._disks[address].writes_left = 0, -1
             self.thaw(address)
@@ -242,15 +264,18 @@ class GauntletRig:
         draws = random_stream(self._seed, RandomStream.GAUNTLET, 3, address, next(self._strangers))
         self._disks[address] = FaultyDisk(draws)
         settings, folder = self.world.tube_settings(tube), self._folder / "state" / "stranger"
-        self.stepper.builders[address] = partial(TubeProcess, settings, folder, disk=self._disks[address])
+        keys = None if self._keyring is None else self._keyring.folder
+        self.stepper.builders[address] = lambda: TubeProcess(
+            settings, folder, disk=self._disks[address], seals=seals_at(keys, settings.tube, self.world.reach)
+        )
 
 
-def new_rig(plan: str, seed: int, folder: Path) -> GauntletRig:
+def new_rig(plan: str, seed: int, folder: Path, *, sealed: bool = False) -> GauntletRig:
     """The rig of a seed, ready to be drilled with."""
     chosen = PLANS[plan]
     world, kept = started_world(plan, seed % WORLDS)
     disks = {a: kept[a].copied(random_stream(seed, RandomStream.GAUNTLET, 4, a)) for a in EVERYBODY}
-    rig = GauntletRig(world.healthy(), disks, chosen.settings, seed, folder)
+    rig = GauntletRig(world.healthy(), disks, chosen.settings, seed, folder, sealed=sealed)
     rig.begin(world.begin + chosen.rested)
     return rig
 

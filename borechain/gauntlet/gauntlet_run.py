@@ -20,7 +20,7 @@ from borechain.gauntlet.gauntlet_rig import PLANS, GauntletRig, make_ready, new_
 from borechain.gauntlet.oracles import Observer, find_violations
 from borechain.gauntlet.seams import drawn_seams, opened_seams
 from borechain.gauntlet.wellness import still_unwell
-from sim.gauntlet.fault_kinds import KINDS
+from sim.gauntlet.fault_kinds import KINDS, SEALED
 from sim.gauntlet.plan import drawn_kinds, steps_of
 from sim.rig.report import station_digest
 from sim.studies.pool import over_cores
@@ -87,7 +87,7 @@ def run_seed(
     folder = Path(tempfile.mkdtemp(prefix="gauntlet-"))
     try:
         with rare_collection():
-            rig = new_rig(plan, seed, folder)
+            rig = new_rig(plan, seed, folder, sealed=not SEALED.isdisjoint(outcome.kinds))
             covered = CoveredStates(rig) if covers else None
             _run(rig, outcome, [covered.look] if covered is not None else [])
             outcome.pairs = set() if covered is None else covered.pairs

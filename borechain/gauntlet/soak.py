@@ -15,7 +15,7 @@ from typing import Any
 from borechain.gauntlet.gauntlet_rig import GauntletRig
 from borechain.gauntlet.oracles import Observer
 from sim.gauntlet.fault import EVERYBODY
-from sim.gauntlet.fault_kinds import KINDS, LASTING
+from sim.gauntlet.fault_kinds import KINDS, LASTING, SEALED
 from sim.gauntlet.faulty_disk import FaultyDisk
 from sim.gauntlet.faulty_world import COMMON, TUBE_LENGTH, FaultyWorld
 from sim.gauntlet.plan import drawn_kinds, steps_of
@@ -27,7 +27,7 @@ TURN_S, STOP_S = 10.0, 32.0
 WINDOW_S = 600.0  # in which a mixture of faults comes and goes
 ADVANCE = 0.8  # m, of the bit in all
 SAMPLES = 24
-HEALABLE = tuple(kind.name for kind in KINDS if kind.name not in LASTING)
+HEALABLE = tuple(kind.name for kind in KINDS if kind.name not in LASTING | SEALED)
 
 
 @dataclass(frozen=True, slots=True)

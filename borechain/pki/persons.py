@@ -49,12 +49,14 @@ def with_person(persons: tuple[Person, ...], name: str, role: str) -> tuple[Pers
     Raises
     ------
     KeyFileError
-        When the name is invalid or has another role, or there are too many.
+        When name or role is invalid, the name has another role, or there are too many.
     """
     if not NAME.fullmatch(name) or TAKEN.fullmatch(name):
         raise KeyFileError(
             f"person: expected a name of 1 to 64 letters, digits, - and _ that no process has, got {name!r:.80}"
         )
+    if role not in PERSON_ROLES:
+        raise KeyFileError(f"person {name}: expected a role of {', '.join(PERSON_ROLES)}, got {role!r:.80}")
     before = {person.name: person for person in persons}
     known = before.get(name)
     if known is not None and not known.is_revoked and known.role != role:

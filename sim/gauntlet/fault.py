@@ -21,11 +21,37 @@ EVERYBODY = (BASE, ENCODER, *TUBES)
 SHORTEST = 1.0  # s
 
 
+class FaultyKeys(Protocol):
+    """Interface of the keys of a sealed rig to their faults."""
+
+    def let_end(self, name: str, left: float) -> None:
+        """Let a certificate end in ``left`` days."""
+
+    def renew(self, name: str) -> None:
+        """Renew a certificate that ends."""
+
+    def let_in(self, name: str) -> None:
+        """Let in one more person, where it is not known."""
+
+    def shut_out(self, name: str) -> None:
+        """Revoke a person that was let in."""
+
+    def misgive(self, address: int) -> None:
+        """Give a process keys of a generation that no other has."""
+
+    def give_back(self, address: int) -> None:
+        """Give a process its own keys again."""
+
+
 class Faulty(Protocol):
     """Interface of a rig to its faults."""
 
     world: FaultyWorld
     channel: FaultyChannel
+
+    @property
+    def keys(self) -> FaultyKeys:
+        """Keys of a rig that is sealed."""
 
     @property
     def now(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.gauntlet import deceptions, hostile, joint_faults, power, readings
+from sim.gauntlet import deceptions, hostile, joint_faults, key_faults, power, readings
 from sim.gauntlet.expected_doubts import EXPECTED
 from sim.gauntlet.fault import TUBES, FaultKind, momentary_fault
 from telemetry.messages import BASE, ENCODER
@@ -118,7 +118,12 @@ KINDS: tuple[FaultKind, ...] = (
         power.power_cut([BASE], power.rot_rows),
         LOST_DATABASE,
     ),
+    FaultKind("certificate-ends", "a certificate ends within days and is renewed", key_faults.certificate_ends),
+    FaultKind("person-revoked", "a person is let in and shut out again", key_faults.person_revoked),
+    FaultKind("wrong-generation", "a tube has keys of another generation", key_faults.wrong_generation),
+    FaultKind("tags-flipped", "a fifth of the frames has a tag with one bit changed", key_faults.tags_flipped()),
 )
+SEALED = frozenset({"certificate-ends", "person-revoked", "wrong-generation", "tags-flipped"})  # need a rig with keys
 KIND_OF = {kind.name: kind for kind in KINDS}
 LASTING = frozenset({"encoder-slips", *EXPECTED})  # that no repair of a crew takes back
 ANSWERS: dict[str, str] = {
@@ -146,6 +151,10 @@ ANSWERS: dict[str, str] = {
     "database-deleted": "the string is learnt anew; the tubes are asked for what is missing",
     "database-old": "the tubes are asked for the numbers that the backup lacks",
     "database-rots": "damage is found by each row's hash; the tubes are asked for messages, the rest is told",
+    "certificate-ends": "the crew is told by name, until it is renewed; tubes and surveys notice nothing",
+    "person-revoked": "the router shuts it out; tubes and surveys notice nothing",
+    "wrong-generation": "it is believed nothing and is silent; with its keys the joint is made anew, nothing is lost",
+    "tags-flipped": "the frame is refused and counted, and comes again",
     "clock-jumps": "the exchange of time finds it; the yaw is taken anew where it matters",
     "clock-drifts": "the clock filter follows",
     "loss": "frames are repeated",

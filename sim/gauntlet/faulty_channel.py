@@ -12,6 +12,7 @@ from sim.world.random_streams import RandomStream, random_stream
 from telemetry.messages import Side
 from telemetry.unwritten import Content
 
+TAG = 8  # bytes at the end of a sealed frame
 OVERHEARD = 64  # frames of a port that a hostile neighbour has recorded
 Port = tuple[int, Side]
 
@@ -24,6 +25,7 @@ class FaultyChannel(LinkChannel):
     port_loss : probability of a frame that leaves a port, beside that of all
     port_delay : s by which what leaves a port is late
     reordering : s within which frames come in any order
+    flipped : probability that one bit of the last bytes of a frame, the tag of a sealed one, is changed
     burst : probability that a frame begins a burst, in which the next 20 are lost
     overheard : the newest frames of each port
     listeners : are called with sender, side and bytes of every frame
@@ -35,6 +37,8 @@ class FaultyChannel(LinkChannel):
         self.port_delay: dict[Port, float] = {}
         self.reordering = 0.0
         self.burst = 0.0
+        self.flipped = 0.0
+        self._flips: dict[Port, np.random.Generator] = {}
         self.overheard: dict[Port, deque[bytes]] = {}
         self.listeners: list[Callable[[int, Side, bytes], None]] = []
         self._seed_of_faults = seed
@@ -50,7 +54,7 @@ class FaultyChannel(LinkChannel):
         overheard.append(bytes(frame))
         for listener in self.listeners:
             listener(sender, side, bytes(frame))
-        found = super().deliveries(sender, side, frame)
+        found = super().deliveries(sender, side, self._flipped(port, frame) if self.flipped else frame)
         if not (self.port_loss or self.port_delay or self.reordering or self.burst):
             return found
         fate, wait, begins = self._draw(port)
@@ -59,6 +63,20 @@ class FaultyChannel(LinkChannel):
             return []
         late = self.port_delay.get(port, 0.0) + wait * self.reordering
         return [(delay + late, arriving) for delay, arriving in found]
+
+    def _flipped(self, port: Port, frame: Content) -> Content:
+        """A frame with one bit of its last bytes changed, or as it is."""
+        random = self._flips.get(port)
+        if random is None:
+            random = self._flips[port] = random_stream(
+                self._seed_of_faults, RandomStream.GAUNTLET, 7, port[0], int(port[1])
+            )
+        fate, place = float(random.random()), int(random.integers(8 * TAG))
+        whole = bytearray(bytes(frame))
+        if fate >= self.flipped or len(whole) < TAG:
+            return frame
+        whole[-1 - place // 8] ^= 1 << place % 8
+        return bytes(whole)
 
     def _draw(self, port: Port) -> tuple[float, float, float]:
         random = self._draws.get(port)

@@ -33,7 +33,8 @@ class RandomStream(IntEnum):
     RADIO = 22  # fate and delays of the frames from one port to another
     RADIO_FADE = 23  # constant loss of a joint
     RADIO_BURSTS = 24
-    GAUNTLET = 25  # 0: which kinds of faults, 1: when and what, 2: ports, 3: strangers, 4: disks, 5: disks before
+    # 0: which kinds of faults, 1: when and what, 2: ports, 3: strangers, 4: disks, 5: disks before, 6: seams, 7: tags
+    GAUNTLET = 25
     LOTS = 26  # of starts that are numbered by lot
     DRAWN_HOLES = 27  # shape of a hole that is drawn
     PLAY = 28  # how a tube lies in the hole: 0: at every stop, 1: its own bow
