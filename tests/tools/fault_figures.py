@@ -41,6 +41,31 @@ LATER = 4.3  # s after a step, at which the world is looked at again
 PORTS = [(BASE, Side.LOWER), (ENCODER, Side.UPPER), (ENCODER, Side.LOWER), *((t, s) for t in (1, 2) for s in Side)]
 
 
+class NotingKeys:
+    """Keys of a rig, of which is noted what is asked."""
+
+    def __init__(self, rig: NotingRig) -> None:
+        self._rig = rig
+
+    def let_end(self, name: str, days: float) -> None:
+        self._rig.note("let end", days, content=name.encode())
+
+    def renew(self, name: str) -> None:
+        self._rig.note("renew", content=name.encode())
+
+    def let_in(self, name: str) -> None:
+        self._rig.note("let in", content=name.encode())
+
+    def shut_out(self, name: str) -> None:
+        self._rig.note("shut out", content=name.encode())
+
+    def misgive(self, tube: int) -> None:
+        self._rig.note("misgive", tube)
+
+    def give_back(self, tube: int) -> None:
+        self._rig.note("give back", tube)
+
+
 class NotingRig:
     """A rig that notes what is asked of it, with the world, the channel and the disks of the gauntlet."""
 
@@ -49,6 +74,7 @@ class NotingRig:
         self.channel = FaultyChannel(1, 0.01, 0.0, 0.0, 0.0)
         self.disks: dict[int, FaultyDisk] = defaultdict(lambda: FaultyDisk(np.random.default_rng(1)))
         self.noted: list[float] = []
+        self.keys = NotingKeys(self)
         for address in (BASE, ENCODER, 1, 2):
             for name, data in FILES:
                 self.disks[address].replace(name, database() if name == DATABASE else data + bytes([address]))
@@ -104,7 +130,14 @@ class NotingRig:
                 local = world.local_clock(address, now)
                 yield from (local, world.true_time(address, local + 1.0))
             yield from world.truth_station(3.0).values()
-        yield from (channel.loss, channel.burst, channel.reordering, channel.corrupt, channel.duplicate)
+        yield from (
+            channel.loss,
+            channel.burst,
+            channel.reordering,
+            channel.corrupt,
+            channel.duplicate,
+            channel.flipped,
+        )
         for port in PORTS:
             yield from (channel.port_loss.get(port, 0.0), channel.port_delay.get(port, 0.0), port in channel.severed)
         for address, disk in sorted(self.disks.items()):

@@ -23,6 +23,7 @@ from borechain.drilling.inline import InlineRig
 from borechain.gauntlet.gauntlet_rig import PLANS, WORLDS, make_ready, new_rig
 from borechain.gauntlet.gauntlet_run import ALL, ANSWERED_AFTER
 from groundstation.service.answers.answer_table import ANSWERS
+from sim.gauntlet.fault_kinds import SEALED
 from sim.gauntlet.plan import steps_of
 from sim.rig.in_process import InProcessStepper
 from sim.rig.stepper import Answer, FrameEvent
@@ -32,8 +33,9 @@ from telemetry.errors import BorechainError
 
 FIGURES = Path(__file__).parents[1] / "data" / "seeded_rigs.json"
 PLAN, TOGETHER, FIRST = "calmed", 6, 3  # kinds of faults of one rig; seed of the first, all in the same world
-COUNT = -(-len(ALL) // TOGETHER)
-RIGS = {FIRST + WORLDS * k: ALL[k::COUNT] for k in range(COUNT)}
+PLAIN = [kind for kind in ALL if kind not in SEALED]  # the others need a rig with keys
+COUNT = -(-len(PLAIN) // TOGETHER)
+RIGS = {FIRST + WORLDS * k: PLAIN[k::COUNT] for k in range(COUNT)}
 # of these a last digit changes the whole, or the time of day, or the lot by which a node without memory is numbered
 LEFT_OUT = "sha256", "hash", "digest", "seal", "key", "utc", "age_s", "sequence", "numbered", "detail"
 NUMBER = re.compile(r"\d+(\.\d+)?")
