@@ -102,8 +102,8 @@ def run_on_chip(target: str, program: Path, folder: Path) -> subprocess.Complete
     hosted = ("-semihosting-config", "enable=on,target=native")
     done = run_program(program_name, *machine, *quiet, *hosted, "-kernel", program, folder=folder)
     if done.returncode < 0:
-        ended = signal.Signals(-done.returncode).name
-        raise AssertionError(f"{target}: {program_name} was ended by {ended}; until then {said_numbers(done.stdout)}")
+        ended, said = signal.Signals(-done.returncode).name, said_numbers(done.stdout + done.stderr)
+        raise AssertionError(f"{target}: {program_name} was ended by {ended}; until then {said}")
     return done
 
 
