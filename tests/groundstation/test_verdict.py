@@ -21,7 +21,7 @@ from groundstation.service.alarms.verdict import (
 )
 from groundstation.service.alarms.verdict_words import WINDS, VerdictDoubt, Word
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.rounding import round_to_std, rounded_std
+from groundstation.service.answers.rounding import largest_first, round_to_std, rounded_std
 from groundstation.service.answers.shapes.answer_fields import fields_of_answer
 from groundstation.service.answers.shapes.column_shapes import Verdict as VerdictAnswer
 from groundstation.service.answers.verdict_views import steering_view, todo_line, verdict_line
@@ -282,6 +282,13 @@ def test_numbers_have_the_digits_that_they_are_worth(value: float, std: float, t
 @given(st.floats(1e-5, 1e3))
 def test_a_standard_deviation_is_never_told_smaller(std: float) -> None:
     assert std * (1.0 - 1e-6) <= rounded_std(std) <= 1.12 * std
+
+
+def test_rows_of_sizes_that_only_rounding_parts_stay_as_they_stand() -> None:
+    third = 1.0 / 3.0
+    rows = [("joint", third), ("mount", math.nextafter(third, 1.0)), ("north", 0.4), ("bias", 0.0), ("play", 0.333334)]
+    found = sorted(rows, key=lambda row: largest_first(row[1]))
+    assert [name for name, _ in found] == ["north", "play", "joint", "mount", "bias"]
 
 
 def test_a_ground_station_that_knows_nothing_says_so(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Every fault of the gauntlet done to a rig that notes all of it: one figure a kind of what is asked, read and left.
+"""Every fault of the gauntlet done to a rig that notes all of it: figures of each kind of what is asked, left and read.
 
 They say that nothing has changed; what each fault is to do is said by the tests of ``tests/gauntlet`` by hand. Where
 one is to do otherwise, ``python tests/tools/fault_figures.py`` writes the figures anew, and the change is read.
@@ -115,7 +115,7 @@ class NotingRig:
         return True
 
     def seen(self) -> Iterator[float]:
-        """What the rig shows now and a little later, and what the fault has left in it."""
+        """What the rig shows now and a little later."""
         world, channel = self.world, self.channel
         for now in (self.now, self.now + LATER):
             self.now = now
@@ -140,6 +140,9 @@ class NotingRig:
         )
         for port in PORTS:
             yield from (channel.port_loss.get(port, 0.0), channel.port_delay.get(port, 0.0), port in channel.severed)
+
+    def left(self) -> Iterator[float]:
+        """What the fault has left on the disks."""
         for address, disk in sorted(self.disks.items()):
             yield from (address, disk.writes_left, len(disk.backups), 0 if disk.refusal is None else disk.refusal)
             for name, file in sorted(disk.files.items()):
@@ -180,21 +183,22 @@ def _weighed(content: bytes) -> list[float]:
     return [float(np.frombuffer(content, np.uint8) @ np.arange(1.0, len(content) + 1.0))]
 
 
-def figure_of_kind(kind: str, world: FaultyWorld) -> float:
-    """Figure of all steps of a kind over a few seeds."""
-    found: list[float] = []
+def figure_of_kind(kind: str, world: FaultyWorld) -> list[float]:
+    """Figures of all steps of a kind over a few seeds: of what is asked and left, whole numbers, and what is shown."""
+    left, shown = list[float](), list[float]()
     for seed in SEEDS:
         rig = NotingRig(world)
         steps = KIND_OF[kind].draw(np.random.default_rng(seed), BEGIN, END)
         for step in sorted(steps, key=lambda one: one.at):
             rig.now = step.at
             step.act(rig)
-            found += [step.at, *rig.noted, *rig.seen()]
+            shown += [step.at, *rig.seen()]
+            left += [*rig.noted, *rig.left()]
             rig.noted = []
-    return figure_of(found)
+    return [figure_of(left), figure_of(shown)]
 
 
-def figure_of_plans() -> float:
+def figure_of_plans() -> list[float]:
     """Figure of which kinds, and when, seeds bring."""
     kinds = [*KIND_OF]
     found: list[float] = []
@@ -204,14 +208,15 @@ def figure_of_plans() -> float:
             for recovers in (True, False):
                 steps = steps_of(seed, chosen, BEGIN, END + 60.0, recovers=recovers)
                 found += [x for name, step in steps for x in (kinds.index(name), step.at)]
-    return figure_of(found)
+    return [figure_of(found)]
 
 
-def everything() -> dict[str, float]:
+def everything() -> dict[str, list[float]]:
     """Figures by kind, and that of the plans."""
     world = FaultyWorld.of_tables(MINUTE, 1)
     return {kind: figure_of_kind(kind, world) for kind in KIND_OF} | {"plans": figure_of_plans()}
 
 
 if __name__ == "__main__":
-    FIGURES.write_text(json.dumps(everything(), indent=1) + "\n", encoding="utf-8")
+    lines = (f" {json.dumps(kind)}: {json.dumps(found)}" for kind, found in everything().items())
+    FIGURES.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")

@@ -19,6 +19,7 @@ import numpy as np
 
 FIGURES = Path(__file__).parents[1] / "data" / "studies" / "figures.json"
 APART = 1e-6  # of the sum of all sizes; last bits of floats differ between families of processors
+ROUNDING = 1e-11  # of a difference that is 0 but for rounding
 TIMES = ("time_over_other", "time_over_other_alone", "milliseconds")  # of a machine, and no figure
 Figure = list[Any]  # words of a column, or the sum by weights that differ and that of the sizes
 
@@ -50,7 +51,7 @@ def apart(found: dict[str, Figure], kept: dict[str, Figure]) -> dict[str, tuple[
 def _are_equal(found: Figure | None, kept: Figure | None) -> bool:
     if found is None or kept is None or len(found) != len(kept):
         return False
-    return found == kept if len(kept) == 1 else abs(found[0] - kept[0]) <= APART * max(kept[1], 1e-9)
+    return found == kept if len(kept) == 1 else abs(found[0] - kept[0]) <= max(APART * kept[1], ROUNDING)
 
 
 def _columns(result: Any, path: str = "") -> Iterator[tuple[str, list[Any]]]:

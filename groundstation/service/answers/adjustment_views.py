@@ -23,6 +23,7 @@ from groundstation.service.answers.adjustment_words import (
 )
 from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
+from groundstation.service.answers.rounding import largest_first
 from groundstation.service.answers.shapes.adjustment_shapes import (
     AdjustedTube,
     AdjustmentAnswer,
@@ -148,7 +149,7 @@ def north_at_toe(k: RigModel) -> Array:
 def toe_shares(budget: Sequence[NamedShare]) -> list[ToeShare]:
     """What each source, tube or joint gives at the toe, the worst first."""
     shares = [ToeShare(one.source, one.subject, CM * std_across(one.variances)) for one in budget]
-    return sorted((one for one in shares if one.sigma_cm > LEAST_SHOWN_CM), key=lambda one: -one.sigma_cm)
+    return sorted((one for one in shares if one.sigma_cm > LEAST_SHOWN_CM), key=lambda one: largest_first(one.sigma_cm))
 
 
 def toe_parts(budget: Sequence[NamedShare]) -> list[ToePart]:
@@ -158,7 +159,7 @@ def toe_parts(budget: Sequence[NamedShare]) -> list[ToePart]:
         by_source.setdefault(one.source, []).append(one)
     total = np.sum([one.variances[:LEVEL] for one in budget], axis=0)
     parts = [part_of(source, same, total) for source, same in by_source.items()]
-    return sorted((one for one in parts if one.sigma_cm > LEAST_SHOWN_CM), key=lambda one: -one.percent)
+    return sorted((one for one in parts if one.sigma_cm > LEAST_SHOWN_CM), key=lambda one: largest_first(one.percent))
 
 
 def part_of(source: str, shares: Sequence[NamedShare], total: Array) -> ToePart:

@@ -10,6 +10,7 @@ import math
 
 DIGITS = 2  # significant, of a standard deviation
 FINEST = 6  # places behind the point
+ALIKE = 6  # significant digits, in which two sizes are alike
 
 
 def decimal_places(std: float) -> int:
@@ -30,3 +31,11 @@ def rounded_std(std: float) -> float:
         return std
     step = 10.0 ** -decimal_places(std)
     return round(math.ceil(std / step - 1e-9) * step, max(decimal_places(std), 0))
+
+
+def largest_first(size: float) -> float:
+    """Key that sorts rows by their size (not negative), those of `ALIKE` sizes staying as they stand.
+
+    Sizes that are the same by symmetry differ in their last digits, and by these from processor to processor.
+    """
+    return -float(f"{size:.{ALIKE}g}")

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 
 from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
+from groundstation.service.answers.rounding import largest_first
 from groundstation.service.answers.setup_costs import setup_costs
 from groundstation.service.answers.shapes.setup_shapes import SetupAnswer, SetupRow
 from groundstation.service.answers.streamed_rows import Parameters
@@ -35,7 +36,7 @@ def answer_setup(k: RigModel, _p: Parameters) -> SetupAnswer:
     contradicted = [say_contradiction(k.setup, kind) for kind in contradicted_kinds(k.setup)]
     hold = say_hold(missing, unchecked, contradicted)
     # a column is judged across its axis: what is wrong of the depth comes after all else
-    ordered = sorted(items, key=lambda item: (not item.is_missing, item.kind in ALONG, -costs[item.name]))
+    ordered = sorted(items, key=lambda item: (not item.is_missing, item.kind in ALONG, largest_first(costs[item.name])))
     return SetupAnswer(
         ready=not hold,
         missing=missing,
