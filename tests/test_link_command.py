@@ -73,11 +73,12 @@ def test_a_scenario_in_a_ground_of_too_much_water_warns_in_a_line_before_it_is_d
     text = (SCENARIOS / "wellbore-1-wet-clay.toml").read_text().replace("water = 0.40", "water = 0.80")
     (tmp_path / "flooded.toml").write_text(text)
     (tmp_path / "wellbore-1-path.csv").write_text((SCENARIOS / "wellbore-1-path.csv").read_text())
-    done = CliRunner().invoke(rig, [str(tmp_path / "flooded.toml"), "--inline", "--json", "--out", str(tmp_path)])
+    within_a_file = tmp_path / "flooded.toml" / "run"  # a folder that is refused where it is to be made
+    done = CliRunner().invoke(rig, [str(tmp_path / "flooded.toml"), "--inline", "--json", "--out", str(within_a_file)])
     assert done.exit_code == 1
     warned, refused = done.stderr.splitlines()
     assert warned.startswith("Warning: water: a soil of this density holds at most 44 % by volume")
-    assert "expected a new or empty folder" in refused
+    assert f"output folder {within_a_file}: Not a directory" in refused
 
 
 @pytest.mark.parametrize(
