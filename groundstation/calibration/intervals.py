@@ -9,6 +9,7 @@ and v along all others. The parameter is correlated with them by g_i, so given t
 (z_i standard normal, a and b its variance by noise of one and by the jig). w(s) is solved for so that the coverage is
 the stated one at every v: Gauss-Newton on log w at knots of log s, the residuals drawn once and for all. Without a jig
 it is Student's interval. Where all error is the jig's it is narrower than any that takes s for noise alone.
+Residuals below all that the jig alone would leave refute it: there the width is that of the jig as it is stated.
 Source: JCGM 100:2008 (GUM), annex G, for the problem; calibration of a confidence interval over a nuisance parameter.
 """
 
@@ -26,6 +27,7 @@ Array = npt.NDArray[np.float64]
 DRAWS = 800  # of the residuals
 SEED = 7  # the same record gives the same interval
 KNOTS = 32
+BELOW_ALL = 0.002  # share of sums of squares without noise below which none is expected: two in a thousand records
 NOISES = np.concatenate([[0.0], np.logspace(-2.5, 3.5, 28)])  # variances over the jig's
 LEAST_NOISE = 1e-3  # of the jig's variance, where the jig leaves nothing in the residuals
 STEPS = 15
@@ -54,17 +56,26 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """Logarithm of the half width at knots of the logarithm of the sum of squares; as its root beyond them."""
+    """Logarithm of the half width at knots of the logarithm of the sum of squares; as its root beyond them.
+
+    ``by_jig`` is the half width by the jig alone, as it is stated: that of residuals which refute it; 0 where the jig
+    does not reach the parameter.
+    """
 
     knots: Array
     widths: Array
+    by_jig: float = 0.0
 
     def half_width(self, squares: Array) -> Array:
         """Half width of the interval for sums of squares (...) of the residuals."""
-        with np.errstate(divide="ignore"):
-            at = np.log(np.asarray(squares, float))
+        at = _log(squares)
         beyond = 0.5 * np.maximum(at - self.knots[-1], 0.0)
-        return np.asarray(np.exp(np.interp(at, self.knots, self.widths) + beyond))
+        found = np.exp(np.interp(at, self.knots, self.widths) + beyond)
+        return np.asarray(np.where(self.is_refuted_by(squares) & (self.by_jig > 0.0), self.by_jig, found))
+
+    def is_refuted_by(self, squares: Array) -> npt.NDArray[np.bool_]:
+        """Whether sums of squares (...) are smaller than the jig alone would leave, in all but `BELOW_ALL`."""
+        return np.asarray(_log(squares) < self.knots[0])
 
 
 def coverage_interval(spread: Spread, coverage: float = COVERAGE) -> Interval:
@@ -78,7 +89,7 @@ def coverage_interval(spread: Spread, coverage: float = COVERAGE) -> Interval:
     noise = c * np.maximum(NOISES, 0.0 if least > NOTHING * c else LEAST_NOISE)
     squares, mean, std = _drawn(spread, noise)
     logs = np.log(np.maximum(squares, NOTHING * n * c))
-    knots = np.linspace(float(np.quantile(logs[:, 0], 0.002)), float(np.max(logs)), KNOTS)
+    knots = np.linspace(float(np.quantile(logs[:, 0], BELOW_ALL)), float(np.max(logs)), KNOTS)
     step = knots[1] - knots[0]
     place = np.clip((logs - knots[0]) / step, 0.0, KNOTS - 1.000001)
     k = place.astype(np.intp)
@@ -99,7 +110,12 @@ def coverage_interval(spread: Spread, coverage: float = COVERAGE) -> Interval:
         design = np.concatenate([by_knot, SMOOTH * bends, NEAR * np.eye(KNOTS)])
         wanted = np.concatenate([coverage - held, -SMOOTH * bends @ off, -NEAR * off])
         widths = widths + np.clip(np.linalg.lstsq(design, wanted, rcond=None)[0], -FURTHEST, FURTHEST)
-    return Interval(knots, widths)
+    return Interval(knots, widths, coverage_factor(None, coverage) * math.sqrt(b))
+
+
+def _log(squares: Array) -> Array:
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(np.asarray(squares, float)))
 
 
 def _drawn(spread: Spread, noise: Array) -> tuple[Array, Array, Array]:

@@ -45,10 +45,14 @@ class Jig:
 
 @dataclass(frozen=True, slots=True)
 class Combined:
-    """Standard errors and half widths (k, 3) of the intervals of coefficients (k, 3)."""
+    """Standard errors and half widths (k, 3) of the intervals of coefficients (k, 3).
+
+    ``refuted`` (3,) is whether the residuals of an axis are too small for the jig as it is stated.
+    """
 
     std: Array
     expanded: Array
+    refuted: npt.NDArray[np.bool_]
 
 
 def combined_uncertainty(
@@ -73,15 +77,17 @@ def combined_uncertainty(
     shown = reading_errors(truth, matrix, settings, jig)
     spreads = spreads_of(basis, shown)
     squares = np.sum(residuals**2, axis=0)
-    std, expanded = np.empty((k, 3)), np.empty((k, 3))
+    std, expanded, refuted = np.empty((k, 3)), np.empty((k, 3)), np.zeros(3, np.bool_)
     left = np.eye(n) - basis @ gain
     least = np.einsum("mn,nimi->i", left, shown) / (n - k)
     for row, axis in np.ndindex(k, 3):
         spread = spreads[row][axis]
         noise = max(float(squares[axis]) / (n - k) - float(least[axis]), 0.0)
         std[row, axis] = math.sqrt(spread.by_noise * noise + spread.by_jig)
-        expanded[row, axis] = coverage_interval(spread, coverage).half_width(squares[axis])
-    return Combined(std, expanded)
+        interval = coverage_interval(spread, coverage)
+        expanded[row, axis] = interval.half_width(squares[axis])
+        refuted[axis] |= interval.is_refuted_by(squares[axis])
+    return Combined(std, expanded, refuted)
 
 
 def spreads_of(basis: Array, shown: Array) -> list[list[Spread]]:

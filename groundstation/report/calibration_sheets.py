@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -50,10 +51,18 @@ def linear_sheet(title: str, fit: AttitudeFit, at: AttitudeErrors, matrix_unit: 
     cells = column_texts(fit.residuals.ravel())
     residual = [cells[k::3] for k in range(3)]
     worst = int(np.argmax(fit.levers))
-    warnings = [
-        f"one {at.unit} of error at attitude {at.names[worst]} moves a parameter by up to {fit.levers[worst]:.0f} "
-        "units; hold it more than once, or lean further"
-    ]
+    warnings = list[str]()
+    if fit.levers[worst] > LONG_LEVER:
+        warnings.append(
+            f"one {at.unit} of error at attitude {at.names[worst]} moves a parameter by up to {fit.levers[worst]:.0f} "
+            "units; hold it more than once, or lean further"
+        )
+    if fit.combined is not None and any(fit.combined.refuted):
+        axes = ", ".join(itertools.compress(AXES, fit.combined.refuted))
+        warnings.append(
+            f"residuals of {axes} are smaller than the jig's stated errors leave them in 998 of 1000 records; "
+            "intervals are those of the jig as stated: state it finer if it is"
+        )
     tables = (
         SheetTable(
             f"Matrix M{matrix_unit} and bias b, {at.unit}",
@@ -90,7 +99,7 @@ def linear_sheet(title: str, fit: AttitudeFit, at: AttitudeErrors, matrix_unit: 
         ("Degrees of freedom", "of known covariances" if fit.degrees is None else f"{fit.degrees} for each axis"),
         ("Design", f"{len(at.names)} attitudes, rank {fit.rank} of 4, condition {number_text(fit.condition, 4)}"),
     )
-    return Sheet(title, (*facts, *ends), tables, warnings if fit.levers[worst] > LONG_LEVER else ())
+    return Sheet(title, (*facts, *ends), tables, warnings)
 
 
 def expanded_uncertainty_text(fit: AttitudeFit) -> str:

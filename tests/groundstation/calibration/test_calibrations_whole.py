@@ -85,6 +85,7 @@ def requests(folder: Path, kind: str) -> CalibrationRequest:
         "turntable-jig": lambda: TurntableRequest(turns, 720.0, jig_deg=(0.02, 0.03), force=True),
         "attitudes": lambda: AttitudesRequest(tilts, temperature_c=23.0),
         "attitudes-jig": lambda: AttitudesRequest(tilts, jig_deg=(0.003, 0.002)),
+        "attitudes-jig-coarse": lambda: AttitudesRequest(tilts, jig_deg=(0.05, 0.02)),
         "attitudes-warns": lambda: AttitudesRequest(DATA / "calibration" / "calibration_vn100_accel.csv"),
         "mwd": lambda: MwdRequest(room, "12"),
         "mwd-tool-face": lambda: MwdRequest(room, "12", tool_face=True, jig_deg=(0.03, 0.02)),
@@ -101,7 +102,7 @@ def requests(folder: Path, kind: str) -> CalibrationRequest:
 
 
 KINDS = (
-    "turntable", "turntable-jig", "attitudes", "attitudes-jig", "attitudes-warns", "mwd", "mwd-tool-face",
+    "turntable", "turntable-jig", "attitudes", "attitudes-jig", "attitudes-jig-coarse", "attitudes-warns", "mwd", "mwd-tool-face",
     "magnetometer", "quality", "quality-nominal", "oven", "oven-steeper", "allan", "rests",
 )  # fmt: skip
 

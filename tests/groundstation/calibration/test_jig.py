@@ -13,6 +13,7 @@ from groundstation.calibration.intervals import Interval, Spread, coverage_inter
 from groundstation.calibration.jig import Jig, cross_product_matrices, reading_errors, settings_of, spreads_of
 from groundstation.calibration.mwd_solve import solve_accelerometers
 from groundstation.calibration.turntable import SETTINGS, as_observations
+from groundstation.report.calibration_sheets import AttitudeErrors, linear_sheet
 from sim.instruments.mwd_jig import Heating, draw_tool, make_design, measure_tool
 from telemetry.errors import CalibrationError
 
@@ -131,6 +132,34 @@ def test_a_lean_moves_readings_across_the_truth_and_by_the_sensors_matrix() -> N
     np.testing.assert_allclose(found[0, :, 1, :], found[0, :, 0, :])
     np.testing.assert_allclose(found[0, :, 2, :], 0.0, atol=1e-18)
     np.testing.assert_allclose(cross_product_matrices(truth)[2] @ np.array([0.0, 1.0, 0.0]), [0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("times", [0.0, 0.02, 0.2])
+def test_residuals_too_small_for_a_jig_give_its_own_intervals_and_say_so(times: float) -> None:
+    """Readings that err by a fraction of the stated jig refute it; no interval is narrower than its standard error."""
+    truth, settings = design("nine, nine times")
+    rng, jig = np.random.default_rng(3), Jig(0.0, 10.0 * LEAN)
+    turns = times * jig.random * rng.normal(size=truth.shape)
+    fit = fit_attitudes(truth, (truth + np.cross(turns, truth)) @ MATRIX.T + BIAS, None, jig, settings)
+    assert fit.combined is not None
+    assert fit.combined.refuted.tolist() == [True] * 3
+    assert np.allclose(fit.matrix_expanded(), 1.959964 * fit.matrix_std(), rtol=1e-6)
+    assert np.allclose(fit.bias_expanded(), 1.959964 * fit.bias_std(), rtol=1e-6)
+    warned = "residuals of x, y, z are smaller than the jig's stated errors leave them in 998 of 1000 records"
+    names = [str(k) for k in range(len(truth))]
+    sheet = linear_sheet("t", fit, AttitudeErrors(names, "g", fit.residuals[:, 0], fit.residuals[:, 0]), "", ())
+    assert [line.startswith(warned) for line in sheet.warnings] == [True]
+
+
+def test_residuals_of_a_jig_as_it_is_stated_refute_nothing() -> None:
+    truth, settings = design("nine, nine times")
+    refuted = 0
+    for seed in range(20):
+        turns = 10.0 * LEAN * np.random.default_rng(seed).normal(size=truth.shape)
+        fit = fit_attitudes(truth, (truth + np.cross(turns, truth)) @ MATRIX.T, None, Jig(0.0, 10.0 * LEAN), settings)
+        assert fit.combined is not None
+        refuted += int(fit.combined.refuted.sum())
+    assert refuted <= 1  # of 60 axes, where one in five hundred is expected
 
 
 def test_a_stated_jig_without_errors_changes_nothing() -> None:
