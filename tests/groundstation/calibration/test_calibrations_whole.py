@@ -102,8 +102,8 @@ def requests(folder: Path, kind: str) -> CalibrationRequest:
 
 
 KINDS = (
-    "turntable", "turntable-jig", "attitudes", "attitudes-jig", "attitudes-jig-coarse", "attitudes-warns", "mwd", "mwd-tool-face",
-    "magnetometer", "quality", "quality-nominal", "oven", "oven-steeper", "allan", "rests",
+    "turntable", "turntable-jig", "attitudes", "attitudes-jig", "attitudes-jig-coarse", "attitudes-warns", "mwd",
+    "mwd-tool-face", "magnetometer", "quality", "quality-nominal", "oven", "oven-steeper", "allan", "rests",
 )  # fmt: skip
 
 
