@@ -71,11 +71,11 @@ class Interval:
         at = _log(squares)
         beyond = 0.5 * np.maximum(at - self.knots[-1], 0.0)
         found = np.exp(np.interp(at, self.knots, self.widths) + beyond)
-        return np.asarray(np.where(self.is_refuted_by(squares) & (self.by_jig > 0.0), self.by_jig, found))
+        return np.asarray(np.where(self.is_refuted_by(squares), self.by_jig, found))
 
     def is_refuted_by(self, squares: Array) -> npt.NDArray[np.bool_]:
         """Whether sums of squares (...) are smaller than the jig alone would leave, in all but `BELOW_ALL`."""
-        return np.asarray(_log(squares) < self.knots[0])
+        return np.asarray((self.by_jig > 0.0) & (_log(squares) < self.knots[0]))
 
 
 def coverage_interval(spread: Spread, coverage: float = COVERAGE) -> Interval:

@@ -162,6 +162,12 @@ def test_residuals_of_a_jig_as_it_is_stated_refute_nothing() -> None:
     assert refuted <= 1  # of 60 axes, where one in five hundred is expected
 
 
+def test_a_jig_without_errors_is_refuted_by_nothing() -> None:
+    without = coverage_interval(Spread(0.2, 0.0, np.zeros(0), np.zeros(0), 5))
+    assert not without.is_refuted_by(np.array([0.0, 1e-300, 1.0])).any()
+    assert without.half_width(np.array([4.0])) == pytest.approx(2.570582 * math.sqrt(0.2 * 4.0 / 5.0), rel=1e-6)
+
+
 def test_a_stated_jig_without_errors_changes_nothing() -> None:
     truth, settings = design("nine attitudes")
     readings = truth @ MATRIX.T + BIAS + 0.01 * np.random.default_rng(3).normal(size=truth.shape)
