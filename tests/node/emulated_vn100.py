@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 import pty
@@ -18,7 +19,7 @@ def line_of(rate: np.ndarray, force: np.ndarray, word: str = "VNIMU") -> bytes:
 
 
 class Line:
-    """Both ends of a serial line."""
+    """Both ends of a serial line, which holds 8 kB and never waits for who should read them."""
 
     def __init__(self) -> None:
         self.end, other = pty.openpty()
@@ -26,7 +27,12 @@ class Line:
         self._other = other
 
     def send(self, data: bytes) -> None:
-        os.write(self.end, data)
+        """Write what fits; the rest is lost, as at a port that nobody reads. It never waits."""
+        os.set_blocking(self.end, False)
+        with contextlib.suppress(BlockingIOError):
+            while data:
+                data = data[os.write(self.end, data) :]
+        os.set_blocking(self.end, True)
 
     def cut(self) -> None:
         os.close(self._other)

@@ -169,7 +169,6 @@ class LivingSensor:
 
     def __init__(self, force: tuple[float, float, float]) -> None:
         self.line, self._force = Line(), np.array(force)
-        os.set_blocking(self.line.end, False)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._live)
         self._thread.start()
@@ -178,14 +177,14 @@ class LivingSensor:
         random, begin, count = np.random.default_rng(6), time.monotonic(), 0
         while not self._stop.is_set():
             asked, _, _ = select.select([self.line.end], [], [], 0.05)
-            with contextlib.suppress(OSError):  # the driver's settings; a line that no driver reads is full
-                if asked:
+            with contextlib.suppress(OSError):
+                if asked:  # the driver's settings
                     os.read(self.line.end, 4096)
                 due = round(100.0 * (time.monotonic() - begin)) - count
                 count += due
                 rates = np.radians([0.1, -1.2, 0.08]) + 4e-4 * random.standard_normal((due, 3))
                 forces = self._force + 0.01 * random.standard_normal((due, 3))
-                os.write(self.line.end, b"".join(map(line_of, rates, forces)))
+                self.line.send(b"".join(map(line_of, rates, forces)))
 
     def stop(self) -> None:
         self._stop.set()

@@ -54,6 +54,7 @@ class Vn100:
             settings[2] = termios.CS8 | termios.CREAD | termios.CLOCAL
             settings[4] = settings[5] = SPEED
             termios.tcsetattr(self._file, termios.TCSANOW, settings)
+            read_waiting(self._file, FOLLOWS_S)  # of before it was opened; TCSAFLUSH leaves what is beyond 4095 bytes
         except (OSError, termios.error) as error:
             self.close()
             raise SensorError(f"vn100: {self._path}: {error}") from error
