@@ -13,7 +13,7 @@ from borechain.cli.ground import check_command
 from borechain.cli.rig.shown_result import show_calibration, show_column, show_result
 from borechain.cli.survey.clearance_command import show_clearance
 from borechain.cli.survey.survey import brought_words, show_survey
-from borechain.cli.survey.wall_command import show_wall
+from borechain.cli.survey.wall_command import chance_text, show_wall
 
 SITE = {
     "gravity_mps2": 9.81234, "latitude_deg": 52.4, "field_nt": None, "convergence_deg": None,
@@ -57,10 +57,10 @@ def test_a_wall_line_by_line() -> None:
         "a column at north -1.00 m, east -5.00 m from 2 to 3 m does not close C-D",
     ]
     assert [cells(line) for line in lines if "│" in line] == [
-        ["C-D", "missing", "7.00", "-", "6.25", "3.00e-01", "3.2", "92"],
-        ["B-C", "open", "6.00", "0.200", "5.25", "3.00e-01", "-", "91"],
-        ["D-E", "unsurveyed", "8.00", "0.100", "7.25", "2.00e-02", "4.2", "93"],
-        ["A-B", "surveyed", "5.00", "0.300", "4.25", "1.00e-04", "1.2", "90"],
+        ["C-D", "missing", "7.00", "-", "6.25", "0.3", "3.2", "92"],
+        ["B-C", "open", "6.00", "0.200", "5.25", "0.3", "-", "91"],
+        ["D-E", "unsurveyed", "8.00", "0.100", "7.25", "0.02", "4.2", "93"],
+        ["A-B", "surveyed", "5.00", "0.300", "4.25", "0.0001", "1.2", "90"],
     ]
     alike = printed(show_wall, wall_result(columns=[{"used_percent": used} for used in (99.9, 100.0, 100.1)]))
     assert "to be tight from 0 to 9 m" in alike
@@ -226,3 +226,11 @@ def test_the_status_of_a_check_says_whether_a_rig_is_ready(
 
 
 # options, and what is reckoned of many
+
+
+@pytest.mark.parametrize(
+    ("probability", "text"),
+    [(1.0, "1"), (0.0234, "0.023"), (1e-9, "1e-09"), (0.9999e-9, "<1e-09"), (0.0, "<1e-09")],
+)
+def test_a_chance_far_below_what_walls_allow_is_told_as_that(probability: float, text: str) -> None:
+    assert chance_text(probability) == text

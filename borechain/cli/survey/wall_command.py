@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from borechain.api import JudgedWall
 
 SHOWN = 10
+LEAST_SHOWN = 1e-9  # a probability
 NOT_TIGHT = 3  # exit status
 
 
@@ -141,7 +142,7 @@ def show_wall(result: dict[str, Any]) -> None:
             f"{row['depth_m']:.2f}",
             number_text(row["thickness_m"], 3),
             f"{row['thinnest_at_m']:.2f}",
-            f"{row['probability']:.2e}",
+            chance_text(row["probability"]),
             number_text(row["moved_apart_cm"], 1),
             number_text(row["direction_deg"], 0),
         )
@@ -169,6 +170,11 @@ def show_wall(result: dict[str, Any]) -> None:
             f"a column at north {extra['north_m']:.2f} m, east {extra['east_m']:.2f} m "
             f"from {extra['from_m']:g} to {extra['to_m']:g} m {verdict} {row['joint']}"
         )
+
+
+def chance_text(probability: float) -> str:
+    """A probability of a table; far below what any wall allows, only that it is."""
+    return f"{probability:.2g}" if probability >= LEAST_SHOWN else f"<{LEAST_SHOWN:g}"
 
 
 def number_text(value: float | None, digits: int) -> str:
