@@ -8,6 +8,7 @@ from pathlib import Path
 
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror")
 CHECKED = ("-g", "-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all")
+CHECKED_LIBRARY = "checked.so"
 C_TYPES = {
     f"{'u' if kind == 'uint' else ''}int{bits}_t": getattr(ctypes, f"c_{kind}{bits}")
     for kind in ("int", "uint")
@@ -24,12 +25,16 @@ def compile_strictly(folder: Path, compiler: str, *words: str | Path) -> subproc
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
 
-def load_checked(folder: Path, sources: Sequence[str | Path], *options: str | Path) -> ctypes.CDLL:
-    """A library of sources; an undefined operation in it ends the process and says where."""
-    made = folder / "checked.so"
-    done = compile_strictly(folder, "gcc", *CHECKED, "-shared", "-fPIC", *options, *sources, "-o", made)
+def compile_checked(folder: Path, sources: Sequence[str | Path], *options: str | Path) -> None:
+    """Compile sources to a library; an undefined operation in it ends the process and says where."""
+    done = compile_strictly(folder, "gcc", *CHECKED, "-shared", "-fPIC", *options, *sources, "-o", CHECKED_LIBRARY)
     assert done.returncode == 0, done.stderr[-2000:]
-    return ctypes.CDLL(str(made))
+
+
+def load_checked(folder: Path, sources: Sequence[str | Path], *options: str | Path) -> ctypes.CDLL:
+    """A library of sources, compiled and loaded."""
+    compile_checked(folder, sources, *options)
+    return ctypes.CDLL(str(folder / CHECKED_LIBRARY))
 
 
 def struct_of(header: str, name: str) -> type[ctypes.Structure]:

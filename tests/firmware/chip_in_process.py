@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from c_library import load_checked
+from c_library import CHECKED_LIBRARY, compile_checked
 
 from node.firmware.event_words import EVENTS_HEADER, write_event_table
 from node.firmware.node_image import IMAGE, LOADER, LOADER_TEXT, provision_node
@@ -38,8 +38,8 @@ STEP_US = 5000
 EXCHANGES, WRONG_ABOVE, WRONG_BELOW, BOOTS, NEXT_NUMBER, OVERFLOWS, KEPT_BYTES, BLOCK_VERSION, UNTRUSTED = range(9)
 
 
-def build_node(folder: Path) -> ctypes.CDLL:
-    """The node's C as a library; an undefined operation in what is written by hand ends the process."""
+def build_node(folder: Path) -> None:
+    """Compile the node's C; an undefined operation in what is written by hand ends the process that runs it."""
     build_firmware(FirmwareRequest("c", MAX_IMUS, folder))
     codec = write_native_codec()
     for name, text in ((NATIVE_HEADER, codec.header), (NATIVE_CODE, codec.code), (EVENTS_HEADER, write_event_table())):
@@ -50,7 +50,12 @@ def build_node(folder: Path) -> ctypes.CDLL:
     step = ["gcc", "-std=c99", "-O1", "-fwrapv", "-fPIC", "-c", CODE, ORDERS_CODE, NATIVE_CODE]  # checked elsewhere
     subprocess.run(step, cwd=folder, check=True)
     objects = [str(Path(name).with_suffix(".o")) for name in (CODE, ORDERS_CODE, NATIVE_CODE)]
-    library = load_checked(folder, [*objects, *own], *includes)
+    compile_checked(folder, [*objects, *own], *includes)
+
+
+def load_node(folder: Path) -> ctypes.CDLL:
+    """The library of a folder in which the node was compiled."""
+    library = ctypes.CDLL(str(folder / CHECKED_LIBRARY))
     library.shim_number.restype = ctypes.c_int64
     library.shim_key(None)
     library.shim_next.restype = ctypes.c_uint8

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator
 
 import msgspec
 import numpy as np
 import pytest
-from chip_in_process import BLOCK_VERSION, KEPT_BYTES, UNTRUSTED, PowerFailedError, build_node, image_of
+from chip_in_process import BLOCK_VERSION, KEPT_BYTES, UNTRUSTED, PowerFailedError
+from chip_rig import CHIP, EPOCH, Rig
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from needed_programs import needs_gcc
-from test_chip_node import CHIP, EPOCH, SETTINGS, Rig
 
 from node.firmware.block_trial import record_of
 from node.kernels.record.integer_node import FIXED_PARAMETERS, PARAMETER_POWERS, PARAMETER_SCALES
@@ -32,16 +31,10 @@ pytestmark = [needs_gcc, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ctypes.CDLL]:
-    loaded = build_node(tmp_path_factory.mktemp("node"))
-    loaded.shim_key(KEY)
-    yield loaded
-    loaded.shim_key(None)
-
-
-@pytest.fixture(scope="module")
-def image(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    return image_of(SETTINGS, tmp_path_factory.mktemp("image"))
+def library(library: ctypes.CDLL) -> ctypes.CDLL:
+    """The library with a key."""
+    library.shim_key(KEY)
+    return library
 
 
 def rocking(at: float) -> float:

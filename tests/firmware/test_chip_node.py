@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,14 +14,10 @@ from chip_in_process import (
     OVERFLOWS,
     WRONG_ABOVE,
     WRONG_BELOW,
-    ChipBetween,
-    ChipNode,
-    Neighbour,
     PowerFailedError,
-    build_node,
-    image_of,
     wrapped,
 )
+from chip_rig import BELOW, CHIP, EPOCH, OFFSET, SETTINGS, Rig
 from needed_programs import needs_gcc
 from one_node import node_of
 from recorded_calls import leaves
@@ -31,14 +26,11 @@ from rough_node import RoughNode
 from node.firmware.event_table import EVENT_TABLE
 from node.firmware.event_words import arguments_in_c
 from node.firmware.saved_state import pack_state_slot, resume_node, unpack_state_slot
-from node.firmware.tube_settings import MakeUpAngle, TubeSettings
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.integer_node import FIXED_CONFIG, FIXED_NODE, new_integers
 from node.kernels.step.fixed_node import FixedNode
 from node.kernels.step.shadow_words import learn_node
-from telemetry.application.endpoint import Endpoint
 from telemetry.messages import (
-    BASE,
     Aiding,
     Command,
     Event,
@@ -53,50 +45,7 @@ from telemetry.messages import (
 from telemetry.presentation.content import content_of_message
 from telemetry.presentation.msgpack_codec import encode_message
 
-CHIP, BELOW = 2, 1
-EPOCH = 3
-OFFSET = 0.7  # rad, of the joint to the drive head
-SETTINGS = TubeSettings(CHIP, drive_joint=MakeUpAngle(OFFSET, 1e-3), lower_joint=MakeUpAngle(-0.4, 1e-3), state_every=2)
 pytestmark = [needs_gcc, pytest.mark.slow]
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
-    return build_node(tmp_path_factory.mktemp("node"))
-
-
-@pytest.fixture(scope="module")
-def image(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    return image_of(SETTINGS, tmp_path_factory.mktemp("image"))
-
-
-class Rig:
-    """A base that is the encoder too, the chip, and perhaps a tube below; the head turns as it is told to."""
-
-    def __init__(self, library: ctypes.CDLL, image: bytes, *, below: bool = False) -> None:
-        endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=EPOCH, is_clock_root=True)
-        endpoint.place.hops = 0
-        self.base = Neighbour(endpoint, Side.LOWER)
-        tube = Endpoint(BELOW, frozenset({Side.UPPER}), boot_count=1) if below else None
-        self.tube = None if tube is None else Neighbour(tube, Side.UPPER)
-        self.chip = ChipNode(library, image, SETTINGS, clock_off_us=123_456_789)
-        self.world = ChipBetween(self.chip, self.base, self.tube)
-        self.world.after_cycle = self._aid
-        self.yaw, self._sequence = 1.0, 0
-        self._receipted: set[int] = set()
-
-    def _aid(self, now: float) -> None:
-        self._sequence += 1
-        aiding = Aiding(self.yaw % math.tau, 1e-8, 0.0, 0.0, 0.0, now, 1, 0, epoch=EPOCH)
-        self.base.endpoint.send_aiding(aiding, now)
-        for message in self.base.heard:
-            if isinstance(message, Event | SurveyMeasurement) and id(message) not in self._receipted:
-                self._receipted.add(id(message))
-                self.base.endpoint.mail.acknowledge(message)
-
-    def heard(self, kind: type) -> list[Any]:
-        """Messages of a kind that the base has heard from the chip."""
-        return [m for m in self.base.heard if isinstance(m, kind) and m.tube == CHIP]
 
 
 def test_the_table_of_events_has_every_code_and_its_arguments() -> None:

@@ -10,9 +10,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from chip_board import next_due, window_begin
-from chip_in_process import build_node, image_of, wrapped
+from chip_in_process import wrapped
+from chip_rig import OFFSET, Rig
 from needed_programs import needs_gcc
-from test_chip_node import OFFSET, SETTINGS, Rig
 
 from node.kernels.arithmetic.formats import PERIOD
 from telemetry.messages import NodeFlag, NodeState
@@ -24,16 +24,6 @@ TURNING, EVERY = 20.0, 60.0  # s, of a turn, from turn to turn
 TURNS = 3
 MOST_LATE = 0.2  # s
 pytestmark = [needs_gcc, pytest.mark.slow]
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
-    return build_node(tmp_path_factory.mktemp("node"))
-
-
-@pytest.fixture(scope="module")
-def image(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    return image_of(SETTINGS, tmp_path_factory.mktemp("image"))
 
 
 def turned(at: float) -> float:
