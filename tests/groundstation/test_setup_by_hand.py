@@ -133,7 +133,6 @@ def test_everything_that_the_configuration_tells_has_its_own_numbers(tmp_path: P
     }
     half = book_of(tmp_path, north_deg=11.0, north_std_deg=0.5, collar_std_deg=0.25)
     assert set(half._standing) == {"north", "collar"}
-    assert set(book_of(tmp_path, stick_up_check_m=0.8)._standing) == set()
     assert half._standing["collar"].values == (0.0, 0.0)
 
 

@@ -304,7 +304,7 @@ def test_a_stop_goes_on_where_the_bit_stands_on_and_one_elsewhere_is_another() -
     assert [found.has(1, at) for at in (157.9, 158.0, 9e9)] == [False, True, True]
     assert [found.has(2, at) for at in (2.9, 3.0, 11.0, 11.1)] == [False, True, True, False]
     assert found.covers(Stand(2, 5.0, 9.0, 3.0))
-    assert list(stops)[0].has(1, 110.0)  # its surveys are still those of its own time
+    assert next(iter(stops)).has(1, 110.0)  # its surveys are still those of its own time
     assert not found.covers(Stand(2, 5.0, 9.1, 3.0))
 
 
