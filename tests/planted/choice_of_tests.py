@@ -21,16 +21,25 @@ CALIBRATIONS, PAPERS, STATIONS, WALLS = (
     for name in ("calibration/test_calibrations", "test_papers", "test_stations", "test_walls")
 )
 DAMAGED, SURVEYS = (f"groundstation/survey/test_{name}_whole.py" for name in ("damaged_files", "surveys"))
+GATEWAY, LEASED, KEPT, CALIBRATED, STRING, *SETUP = (
+    f"groundstation/test_{name}_by_hand.py"
+    for name in ("gateway", "leased", "kept", "recalibration", "string", "setup", "setup_told", "setup_costs")
+)
+PAGE = ("groundstation/test_page_rooms_by_hand.py", "groundstation/test_page_papers_by_hand.py")
 SEEDED = ("sim/test_seeded_worlds.py",)
+SMALL = ("test_small_doors_by_hand.py",)
 WHOLE = {  # tests that look at a whole room: without importing it, or from a folder of which none is chosen
-    "benchmarks/": ("test_benches_by_hand.py", "test_benches_of_rigs_by_hand.py"),
+    "benchmarks/": ("test_benches_by_hand.py", "test_benches_of_rigs_by_hand.py", *SMALL),
+    "borechain/cli/rig/": SMALL,
     "borechain/cli/": ("test_options_whole.py",),
-    "borechain/gauntlet/": ("gauntlet/test_oracles_by_hand.py", "gauntlet/test_wellness_by_hand.py"),
+    "borechain/gauntlet/": ("gauntlet/test_oracles_by_hand.py", "gauntlet/test_wellness_by_hand.py", *SMALL),
     "borechain/studies/": ("studies/test_studies_whole.py", "studies/test_set_up_study_whole.py"),
+    "node/__main__": SMALL,
     "node/firmware/": ("node/test_seeded_nodes.py",),
     "node/kernels/": ("node/test_seeded_nodes.py",),
     "node/process/": ("test_seeded_rigs.py",),
     "node/translation/c_": ("node/chip/test_translated_forms.py",),
+    "telemetry/application/end": ("telemetry/test_endpoint_by_hand.py", "telemetry/test_mail_by_hand.py"),
     "telemetry/application/": ("test_seeded_rigs.py",),
     "telemetry/media/can_": ("telemetry/test_whole_wire.py",),
     "telemetry/media/isotp.py": ("telemetry/test_whole_wire.py",),
@@ -48,6 +57,13 @@ WHOLE = {  # tests that look at a whole room: without importing it, or from a fo
     "groundstation/report/rest": (CALIBRATIONS,),
     "groundstation/report/s": (CALIBRATIONS, SURVEYS),
     "groundstation/report/": (PAPERS,),
+    **{f"groundstation/gateway/page/{begin}": PAGE for begin in ("a", "c", "e", "o", "p", "r", "se")},  # no script
+    "groundstation/gateway/le": (LEASED,),
+    "groundstation/gateway/zenoh": (GATEWAY,),
+    "groundstation/service/disk/": (KEPT,),
+    "groundstation/service/orders/recalibration/": (CALIBRATED,),
+    "groundstation/service/setup/": tuple(SETUP),
+    "groundstation/service/string/": (STRING,),
     "groundstation/service/": (STATIONS,),
     "groundstation/survey/adjustment/": (STATIONS,),
     "groundstation/survey/exports/": (SURVEYS, WALLS),
@@ -59,10 +75,10 @@ WHOLE = {  # tests that look at a whole room: without importing it, or from a fo
     "groundstation/survey/wall/": (WALLS, DAMAGED),
     "groundstation/survey/well/": (SURVEYS, STATIONS),
     "sim/campaign/": SEEDED,
-    "sim/gauntlet/": ("gauntlet/test_faults_as_they_were.py",),
+    "sim/gauntlet/": ("gauntlet/test_faults_as_they_were.py", *SMALL),
     "sim/instruments/": SEEDED,
     "sim/string/": SEEDED,
-    "sim/studies/": ("sim/test_study_tables.py",),
+    "sim/studies/": ("sim/test_study_tables.py", *SMALL),
     "sim/world/": SEEDED,
 }
 IMPORT = re.compile(r"^ *(?:from|import) ([\w.]+)(?: import ([\w, ]*))?", re.MULTILINE)

@@ -268,10 +268,25 @@ def drawn_of_trusted(root: Path, size: int, seed: int) -> list[Mutant]:
     return sorted(drawn, key=lambda m: m.name)
 
 
+def drawn_below(root: Path, places: Sequence[str], size: int, seed: int) -> list[Mutant]:
+    """So many mutants of files and folders, each place alike; a statement that is left out is drawn as well."""
+    drawn, draw = [], random.Random(seed)
+    rooms = [[(f, c) for f in _sources_of(root, (place,)) for c in changes_of(f, WiderChanges)] for place in places]
+    for _ in range(size):
+        place = draw.choice([k for k, left in enumerate(rooms) if left])
+        file, change = rooms[place].pop(draw.randrange(len(rooms[place])))
+        drawn.append(mutant_of(root, places[place], file, change))
+    return sorted(drawn, key=lambda m: m.name)
+
+
 def files_of(root: Path, area: str) -> Sequence[Path]:
     """Sources of an area."""
+    return _sources_of(root, (AREAS | TRUSTED)[area])
+
+
+def _sources_of(root: Path, places: Sequence[str]) -> Sequence[Path]:
     files: list[Path] = []
-    for place in (AREAS | TRUSTED)[area]:
+    for place in places:
         path = root / place
         files += sorted(path.rglob("*.py")) if path.is_dir() else [path]
     return [file for file in files if COMPILED not in file.parts]

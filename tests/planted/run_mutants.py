@@ -14,7 +14,7 @@ from collections import defaultdict
 from pathlib import Path
 
 from defect_lists import ROOT, DefectError
-from mutants import drawn_mutants, drawn_of_trusted
+from mutants import Mutant, drawn_below, drawn_mutants, drawn_of_trusted
 from run_planted import LIBRARIES, PASSES, judge_all
 
 
@@ -24,6 +24,7 @@ def main() -> int:
     parser.add_argument("--size", type=int, default=300, help="of the sample")
     parser.add_argument("--seed", type=int, default=52, help="that draws it")
     parser.add_argument("--trusted", action="store_true", help="of service, store, link and keys, statements too")
+    parser.add_argument("--under", default="", metavar="PLACES", help="of these files and folders, parted by commas")
     parser.add_argument("--list", dest="listed", action="store_true", help="name them, and judge nothing")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="at a time")
     parser.add_argument("--fast", action="store_true", help="without the tests that are marked slow")
@@ -33,8 +34,7 @@ def main() -> int:
     arguments = parser.parse_args()
     for library in LIBRARIES.split():
         importlib.import_module(library)
-    drawn = (drawn_of_trusted if arguments.trusted else drawn_mutants)(ROOT, arguments.size, arguments.seed)
-    mutants = [one for one in drawn if arguments.only in one.name]
+    mutants = [one for one in drawn_as_asked(arguments) if arguments.only in one.name]
     if arguments.listed:
         print("\n".join(f"{one.package}  {one.name}" for one in mutants))
         return 0
@@ -55,6 +55,13 @@ def main() -> int:
     if arguments.out:
         arguments.out.write_text("".join(f"{name}\n" for name in sorted(survivors)), encoding="utf-8")
     return 0 if 100.0 * sum(found["all"]) >= arguments.at_least * len(found["all"]) else 1
+
+
+def drawn_as_asked(arguments: argparse.Namespace) -> list[Mutant]:
+    """The sample that the options ask for."""
+    if arguments.under:
+        return drawn_below(ROOT, arguments.under.split(","), arguments.size, arguments.seed)
+    return (drawn_of_trusted if arguments.trusted else drawn_mutants)(ROOT, arguments.size, arguments.seed)
 
 
 if __name__ == "__main__":

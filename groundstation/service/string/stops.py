@@ -184,4 +184,6 @@ def _stand_covers(whole: Stand, stand: Stand) -> bool:
 
 
 def _is_same_stop(one: Stand, other: Stand) -> bool:
-    return (one.epoch, one.md) == (other.epoch, other.md) and one.begun_at <= other.ended_at >= one.ended_at
+    """Whether a stand is the one of a stop that lasts longer: not one at its depth that the bit came back to."""
+    touches = one.begun_at <= other.ended_at and other.begun_at <= one.ended_at
+    return (one.epoch, one.md) == (other.epoch, other.md) and touches and one.ended_at <= other.ended_at

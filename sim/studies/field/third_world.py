@@ -19,7 +19,7 @@ def _world(hertz: float = 250.0, **tables: object) -> Tables:
 
 
 def _rough(hertz: float = 250.0, **tables: object) -> Tables:
-    return _world(hertz, rough=tables)
+    return _world(rough={"samples_hz": hertz, **tables})
 
 
 def _befallen(name: str, **keys: object) -> Tables:
