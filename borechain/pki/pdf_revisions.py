@@ -145,8 +145,9 @@ def _last_table(pdf: bytes) -> tuple[bytes, int]:
 
 def _catalog(pdf: bytes, root: int) -> bytes:
     """Newest catalog of a document, between its double angles."""
-    starts = [match.end() for match in re.finditer(rb"(?:^|\n)%d 0 obj\n" % root, pdf)]
-    body = pdf[starts[-1] : pdf.find(b"endobj", starts[-1])].strip() if starts else b""
+    head = b"\n%d 0 obj\n" % root
+    _, found, rest = pdf.rpartition(head)
+    body = rest[: rest.find(b"endobj")].strip() if found else b""
     if not body.startswith(b"<<") or b"/Type/Catalog" not in body:
         raise SignedFileError("expected a report as this program sets it, got a PDF without a plain catalog")
     return body

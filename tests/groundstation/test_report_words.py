@@ -51,6 +51,11 @@ NO_WORD = re.compile(UNITS + r"|[0-9a-f]{64}|[A-Z]+(-[A-Z]+)?|[PRKD]-?\d+.*|[\d.
 DRAWN = re.compile(r"\$.*\$|rms [\d.e-]+ \S+|K7|P\d\d")  # ticks, and what is the same in every language
 
 
+def in_turn(languages: list[str]) -> pytest.MarkDecorator:
+    """Every test of one language before those of the next: two workers that share them do not each set every report."""
+    return pytest.mark.parametrize("language", languages, scope="module")
+
+
 def origin_in(language: str) -> Origin:
     papers = ReportPapers("D-17", "B", "Bohr and Sons", "City railways", language)
     return Origin(DAY, "1.2.3", [("SHA-256 of wall.toml", "ab" * 32)], papers)
@@ -141,7 +146,7 @@ def test_no_title_of_a_picture_is_cut(tmp_path: Path) -> None:
         assert extent.y1 <= figure.bbox.y1
 
 
-@pytest.mark.parametrize("language", OTHERS)
+@in_turn(OTHERS)
 def test_no_english_phrase_is_left(said: Callable[[str], Said], language: str) -> None:
     english, other = said("en"), said(language)
     assert len(english.texts) == len(other.texts)
@@ -154,14 +159,14 @@ def test_no_english_phrase_is_left(said: Callable[[str], Said], language: str) -
         assert sorted(re.findall(r"\d[\d.]*\d|\d", a)) == sorted(re.findall(r"\d[\d.]*\d|\d", b)), (a, b)
 
 
-@pytest.mark.parametrize("language", OTHERS)
+@in_turn(OTHERS)
 def test_numbers_stay_as_they_are(said: Callable[[str], Said], language: str) -> None:
     for one, other in zip(said("en").contents, said(language).contents, strict=True):
         for a, b in zip(texts(one), texts(other), strict=True):
             assert sorted(re.findall(r"-?\d[\d.]*\d|\d", a)) == sorted(re.findall(r"-?\d[\d.]*\d|\d", b)), (a, b)
 
 
-@pytest.mark.parametrize("language", OTHERS)
+@in_turn(OTHERS)
 def test_names_of_people_stay_as_they_are(said: Callable[[str], Said], language: str) -> None:
     content = said(language).contents[-1]
     shown = [text for _, text in content["facts"]]
@@ -253,7 +258,7 @@ def test_a_warning_and_what_is_not_stated_are_said_in_every_language(text: str, 
     assert not english & set(re.findall(r"[a-z]+", told)) - ({"station"} if language == "fr" else set())
 
 
-@pytest.mark.parametrize("language", LANGUAGES)
+@in_turn([*OTHERS, "en"])
 def test_every_report_is_set_and_alike_twice(said: Callable[[str], Said], language: str) -> None:
     hole = said(language).documents[-1]
     assert report_pdf(hole) == report_pdf(hole)

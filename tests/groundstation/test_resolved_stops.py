@@ -130,7 +130,7 @@ def test_what_is_shown_of_many_surveys_is_what_each_of_them_says() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("weighting", "stops"), [("bayes", 50), ("adjusted", 15)])
+@pytest.mark.parametrize(("weighting", "stops"), [("bayes", 25), ("adjusted", 15)])
 def test_a_survey_takes_little_memory(tmp_path: Path, weighting: str, stops: int) -> None:
     """Ten tubes that survey the same stations again and again.
 

@@ -3,15 +3,18 @@
 import math
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 from node_by_node import drill_node_by_node
+from numba.extending import typeof_impl
 
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Scheme
 from node.kernels.step.address import BY_ADDRESS
 from sim.errors import ScenarioError
 from sim.string.direct_string import DirectString
+from sim.string.nodes import loop_of
 from sim.string.result import StringRun
 from sim.string.schedule import aiding_passes
 from sim.studies.epochs import resting_string
@@ -176,3 +179,10 @@ def test_a_string_in_one_call_is_the_string_node_by_node(scheme: str, kernel: st
     assert together.events == apart.events
     assert together.surveys == apart.surveys
     assert len(together.surveys) == 6
+
+
+@pytest.mark.parametrize("tubes", [1, 3])
+def test_the_type_of_a_loop_in_integers_is_made_once_and_is_what_numba_would_make(tubes: int) -> None:
+    loop = loop_of("fixed", tubes).integers
+    assert numba.typeof(loop) is numba.typeof(loop_of("fixed", 2).integers)
+    assert numba.typeof(loop) == typeof_impl.dispatch(tuple)(loop, None)

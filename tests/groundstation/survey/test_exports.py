@@ -164,8 +164,9 @@ def test_diggs_is_valid_and_refused_with_a_defect(tmp_path: Path) -> None:
 def test_ags_breaks_no_rule_and_a_defect_does(tmp_path: Path) -> None:
     """The checker asks for an older `rich` than ours, so it has an environment of its own."""
     python = tmp_path / "ags" / "bin" / "python"
-    subprocess.run([sys.executable, "-m", "venv", tmp_path / "ags"], check=True)
-    subprocess.run([python, "-m", "pip", "install", "--quiet", "python-ags4>=1.1"], check=True, capture_output=True)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path / "ags"], check=True)
+    install = [sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-compile"]
+    subprocess.run([*install, "python-ags4>=1.1"], check=True, capture_output=True)
     script = (
         "import json, sys\nfrom python_ags4 import AGS4\nfound = AGS4.check_file(sys.argv[1])\n"
         "print('\\n' + json.dumps([k for k in found if k.startswith('AGS Format Rule')]))"
