@@ -18,7 +18,8 @@ Then the a and p are taken by which the bounds are exceeded least, in squares, o
 
 Reads fall anywhere between two frames and are late as often as early, so as many exceed one bound as the other. Its
 error is that of an M-estimator (Huber 1964): H^-1 (sum e_i^2 x_i x_i^T) H^-1, with the excesses e_i, x_i = (1, n_i)
-and H = sum x_i x_i^T over the reads that exceed.
+and H = sum x_i x_i^T over the reads that exceed. Where the newest reads exceed to one side the time of reads has been
+moved, and the reads before say no more.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ KNOWN: Final = 1e-3  # of a period that is known, by which it may wander until i
 LARGEST_ERROR: Final = 0.2  # of a crystal; more is a FIFO that was read late
 NARROWER: Final = 16  # times that the range of the period is cut by a third
 OFF_TIME: Final = 2 * READS[-1]  # of the last reads: more contradictions than two reads make that were late by chance
+MOVED: Final = 5  # sigmas that the excesses of the fewest reads together are off 0, from where the time was moved
 ROUNDS: Final = 20  # of Newton's method at most: the excesses are linear between changes of sign, so few are needed
 
 
@@ -85,8 +87,16 @@ class FrameClock:
 
     def _fit_to(self, t: Array, n: Array) -> None:
         """Find period and phase by reads at ``t`` (k,) s, off their time, that brought the counts ``n`` (k,)."""
-        newest, period, var = least_excess(t, n - n[-1], self.newest, self.period)
-        if var > 0.0:
+        since = n - n[-1]
+        newest, period, var = least_excess(t, since, self.newest, self.period)
+        if var == 0.0:
+            return
+        if is_moved(t - period * since - newest, period):
+            last = self._reads[-1]
+            self.begin()
+            self._reads.append(last)
+            self._look_at(t[-1:], n[-1:])
+        else:
             self.newest, self.period, self.std = newest, period, math.sqrt(var)
 
     def _look_at(self, t: Array, n: Array) -> None:
@@ -126,6 +136,17 @@ def farthest_period(t: Array, n: Array, lowest: float, highest: float) -> float:
         else:
             highest = high
     return 0.5 * (lowest + highest)
+
+
+def is_moved(since: Array, period: float) -> bool:
+    """Whether the time of the newest reads is another one: the fewest of them exceed their bounds to one side.
+
+    ``since`` (k,) s is what passed between the frame that each read found last and the read.
+    """
+    excess = np.minimum(since, 0.0) + np.maximum(since - period, 0.0)
+    newest = excess[-READS[-1] :]
+    is_beyond = np.sum(newest) ** 2 > MOVED**2 * len(newest) * np.mean(excess**2)
+    return bool(len(excess) > 2 * len(newest) and is_beyond)
 
 
 @kernel
