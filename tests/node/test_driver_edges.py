@@ -10,8 +10,8 @@ import pytest
 from emulated_mpu import CAPACITY, EmulatedMpu
 
 from node.errors import SensorError
-from node.kernels.arithmetic.formats import DEG, PERIOD
-from node.process.drivers.frame_clock import FrameClock
+from node.kernels.arithmetic.formats import DEG, PERIOD, Array
+from node.process.drivers.frame_clock import FrameClock, least_excess
 from node.process.drivers.mpu_imu import MpuImu
 from node.process.drivers.quadrature import LARGEST_JUMP, QuadratureFile
 from node.process.drivers.timed import TimedImu
@@ -142,6 +142,84 @@ def test_lost_frames_begin_another_phase(times: int) -> None:
         clock.on_read(at + 0.3, 2)  # of fifteen
         at += 0.3
         assert clock.std == pytest.approx(clock.period / math.sqrt(12.0), rel=1e-6)
+
+
+def dated_reads(
+    seed: int, off: float, reads: int, late: tuple[int, ...] = (), moved: int | None = None
+) -> tuple[Array, Array]:
+    """Errors and stated deviations (reads,), s, of a clock whose reads are off their time by ``off`` (s).
+
+    The crystal is its own and 0.4 % fast; the reads numbered in ``late`` come 30 ms late besides, and from the read
+    ``moved`` on their time is 20 ms behind.
+    """
+    random, period = np.random.default_rng(seed), 0.02 / 1.004
+    phase, clock, taken = period * random.uniform(), FrameClock(50.0), 0
+    error, std = np.zeros(reads), np.zeros(reads)
+    for k in range(reads):
+        at = (k + 1) * PERIOD
+        behind = 0.02 if moved is not None and k >= moved else 0.0
+        done = at + behind + off * random.standard_normal() + (0.03 if k in late else 0.0)
+        count = math.floor((done - phase) / period)
+        error[k] = clock.on_read(at, count - taken) - (phase + period * count - behind)
+        std[k], taken = clock.std, count
+    return error, std
+
+
+def test_frames_of_reads_that_are_off_their_time_are_dated_as_well_as_is_said() -> None:
+    """Reads 5 ms off contradict each other, and bounds that they set by chance would be 4 ms off, stated as 1 ms."""
+    found = [dated_reads(seed, 5e-3, 300) for seed in range(12)]
+    error, std = (np.concatenate([one[k][60:] for one in found]) for k in range(2))
+    assert math.sqrt(np.mean(error**2)) < 2e-3
+    assert np.max(std) < 5e-3
+    assert 0.5 < np.mean(error**2 / std**2) < 2.0
+    assert np.mean(np.abs(error) > 3.0 * std) < 0.02
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_two_late_reads_spoil_the_date_of_no_frames_but_those_around_them(seed: int) -> None:
+    """Sixteen reads after the last of them it is bounds again that date, and not a fit that has the late ones in it."""
+    error, std = dated_reads(seed, 0.0, 200, (80, 120))
+    assert np.median(np.abs(error[140:])) < 1e-3
+    assert np.median(std[140:]) < 6e-4
+
+
+def test_a_time_that_is_moved_among_reads_that_are_off_it_dates_anew() -> None:
+    """A fit to reads on both sides of the step would be 5 ms off for two minutes, stated as 1.3 ms."""
+    found = [dated_reads(seed, 5e-3, 360, moved=220) for seed in range(8)]
+    error, std = (np.concatenate([one[k][270:] for one in found]) for k in range(2))
+    assert math.sqrt(np.mean(error**2)) < 3e-3
+    assert 0.5 < np.mean(error**2 / std**2) < 2.0
+
+
+def test_reads_exceed_their_bounds_least_where_their_excesses_cancel() -> None:
+    """At the least sum of squares its gradient is 0, and the variance is that of the formula, by matrices."""
+    random = np.random.default_rng(3)
+    k = np.arange(120)
+    t = PERIOD * k
+    n = np.floor((t + 5e-3 * random.standard_normal(120) - 0.007) / 0.02)
+    n -= n[-1]
+    phase, period, var = least_excess(t, n, t[-1] - 0.012, 0.0201)
+    off = t - period * n - phase
+    excess = np.where(off < 0.0, off, np.maximum(off - period, 0.0))
+    beyond = excess != 0.0
+    x = np.stack([np.ones(120), np.where(off < 0.0, n, n + 1.0)], axis=1)[beyond]
+    e = excess[beyond]
+    assert period == pytest.approx(0.02, rel=2e-4)
+    assert 10 < np.sum(off < 0.0) < 60
+    assert 10 < np.sum(off > period) < 60
+    np.testing.assert_allclose(x.T @ e, 0.0, atol=1e-9)
+    inverse = np.linalg.inv(x.T @ x)
+    assert var == pytest.approx((inverse @ (x.T * e**2) @ x @ inverse)[0, 0], rel=1e-6)
+
+
+@pytest.mark.parametrize("exceeding", [0, 1, 2])
+def test_fewer_than_three_reads_beyond_their_bounds_tell_nothing(exceeding: int) -> None:
+    t, n = PERIOD * np.arange(20.0), np.floor(PERIOD * np.arange(20.0) / 0.02)
+    n[[3, 12][:exceeding]] += 2.0
+    phase, period, var = least_excess(t, n - n[-1], 0.02 * n[-1], 0.02)
+    assert phase == 0.02 * n[-1]
+    assert period == 0.02
+    assert var == 0.0
 
 
 class Counter:

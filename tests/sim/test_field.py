@@ -117,6 +117,18 @@ def test_seeds_that_a_node_was_wrong_about_are_honest(key: str, seeds: tuple[int
     assert made["surveys_percent"] == 100.0
 
 
+@pytest.mark.slow
+def test_frames_that_are_dated_by_a_busy_machine_are_no_step_of_a_gyroscope() -> None:
+    """Seeds in which a head that slows down made three steps, by frames dated 6 ms off and stated to be 1 ms off."""
+    (case,) = chosen_cases("jitter-fifo")
+    made = disturbance_row(case, [run_seed((case, seed)) for seed in (27, 29)])
+    assert made["gyro_step"] == made["gyro_scale"] == made["other_faults"] == 0.0
+    assert made["nees_turning"] <= 1.5
+    assert made["yaw_rms_turning_deg"] < 0.03
+    assert made["unflagged_percent"] <= 1.0
+    assert made["told_percent"] <= 1.0
+
+
 def test_a_row_says_what_it_saw() -> None:
     world, run, found = drilled("random-phase")
     (case,) = chosen_cases("random-phase")
