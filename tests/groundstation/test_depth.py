@@ -241,6 +241,30 @@ def test_two_stands_that_contradict_each_other_are_both_doubtful_and_the_present
     assert bit.log.at(EPOCH, bit.stand(10.0)) == 2.0
 
 
+@pytest.mark.parametrize("is_restarted", [False, True])
+def test_a_stand_is_believed_again_where_the_depth_returns_to_it_and_the_one_that_contradicted_it_is_not(
+    is_restarted: bool,
+) -> None:
+    """As after a jump that was heard: without that, a stop that was surveyed would be another one after it."""
+    bit = Bit()
+    bit.move_to(2.0, heard=False)
+    right = bit.stand(20.0, heard=False)
+    bit.now += CYCLE
+    bit.read(0.5, heard=False)
+    wrong = bit.stand(20.0, heard=False)
+    bit.hear_stands()
+    bit.stand(10.0)
+    if is_restarted:
+        doubt, bit.log = bit.log.doubt, DepthLog(0.5, 5.0)
+        bit.log.recall(doubt)
+    bit.now += CYCLE
+    bit.read(2.0)
+    bit.stand(10.0)
+    bit.hear_stands()
+    assert bit.log.at(EPOCH, right) == 2.0
+    assert bit.log.at(EPOCH, wrong) is None
+
+
 def test_of_a_jump_that_the_crew_looked_at_the_stands_that_go_on_are_believed_and_no_others() -> None:
     log = DepthLog(0.5, 5.0)
     before = Stand(EPOCH, 1000.0, 1010.0, 6.0)

@@ -67,6 +67,18 @@ def test_a_stop_whose_last_stand_is_a_part_of_it_goes_on_too(tally: Tally) -> No
     assert missing(stops) == {1, 2}
 
 
+def test_parts_of_a_stop_that_are_told_again_with_every_reading_are_no_other_stops(tally: Tally) -> None:
+    """Readings were refused for a while: what the string stood before is a stand of its own, and is told for long."""
+    depths, stops = DepthLog(1.0, 5.0), Stops(tally, DUE)
+    before, after = Stand(2, 1000.0, 1025.0, 4.0), 1040.0
+    take_stand(depths, stops, Stand(2, 900.0, 950.0, 3.0))
+    first = len(list(stops))
+    for seconds in range(1, 30):
+        take_stand(depths, stops, before)
+        take_stand(depths, stops, Stand(2, after, after + seconds, 4.0))
+    assert [stop.stand for stop in list(stops)[first:]] == [Stand(2, 1000.0, 1069.0, 4.0)]
+
+
 def test_a_stop_that_was_too_short_before_and_after_owes_nothing(tally: Tally) -> None:
     stops = Stops(tally, DUE)
     stops.on_stand(Stand(2, 1000.0, 1010.0, 4.0))

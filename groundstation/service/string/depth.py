@@ -289,10 +289,16 @@ class DepthLog:
                 self._doubt(Stand(raw[0], raw[1], reading.at, raw[2]))
         elif self._trusted is not None and abs(reading.md - self._trusted[2]) <= RETURNED:
             self.jumped = ""
+            self._trust_stand(self._trusted)
         elif self._doubtful and self._doubtful[-1].epoch == raw[0]:
             self._doubtful[-1] = replace(self._doubtful[-1], ended_at=reading.at)
         else:
             self._doubt(Stand(raw[0], raw[1], reading.at, raw[2]))
+
+    def _trust_stand(self, end: tuple[int, float, float]) -> None:
+        """Doubt no more a stand that ended at the trusted reading: the one that contradicts it was the jump."""
+        believed = (time for time in self._doubtful if (time.epoch, time.ended_at, time.md) != end)
+        self._doubtful = deque(believed, maxlen=DOUBTS_KEPT)
 
     def _count(self, sequence: int) -> None:
         if self._sequence is not None and sequence > self._sequence + 1:

@@ -60,6 +60,10 @@ class Stop:
         """Whether a stand is a part of the stop."""
         return any(_stand_covers(whole, stand) for whole in (self.stand, *self.later))
 
+    def is_of(self, stand: Stand) -> bool:
+        """Whether a stand is the stop, a part of it, or more of it."""
+        return _is_same_stop(self.stand, stand) or self.covers(stand)
+
     def age(self, epoch: int, rig_now: float) -> float:
         """Seconds from its begin to ``rig_now`` (s) of an epoch, fewer where rig time began anew; infinite after it."""
         newest = (self.stand, *self.later)[-1]
@@ -136,10 +140,14 @@ class Stops:
         return bool(self._taken.tubes_of(Stop(stand, ())))
 
     def on_stand(self, stand: Stand) -> None:
-        """A stand has begun, or lasted longer; the tubes are those that are known to hang while it lasts."""
-        known = next((stop for stop in reversed(self._stops) if _is_same_stop(stop.stand, stand)), None)
+        """A stand has begun, or lasted longer; the tubes are those that are known to hang while it lasts.
+
+        A source of the depth tells its last stands with every reading, also the parts of a stop that goes on.
+        """
+        known = next((stop for stop in reversed(self._stops) if stop.is_of(stand)), None)
         if known is not None:
-            known.stand = stand
+            if not known.covers(stand):
+                known.stand = stand
             self._add_tubes(known)
             return
         self._stops.append(Stop(stand, tuple(self._tally.tubes_below(IN_THE_HOLE, stand.md))))
