@@ -156,6 +156,19 @@ def test_a_database_is_durable_patient_and_small_and_leaves_nothing_open(
     assert len(opened) == 1
 
 
+def test_a_database_that_refused_is_opened_anew(tmp_path: Path) -> None:
+    """A connection of a file that could not be written stays so."""
+    with contextlib.closing(Store(url(tmp_path))) as store:
+        for turn in range(2):
+            before = store._engine.pool
+            with pytest.raises(StoreError, match="cannot"), store._writing():
+                raise OSError("cannot")
+            assert store._engine.pool is not before
+            assert "cannot" in store.refusal
+            store.add_message(survey(1, 1 + turn), None)
+            assert store.refusal == ""
+
+
 @pytest.mark.parametrize("address", ["nonsense", "mysql://u:secret@h/d"])
 def test_a_database_that_cannot_be_named_is_refused_without_its_password(address: str) -> None:
     with pytest.raises(StoreError, match="database URL: expected one such as sqlite:///FILE whose driver") as refused:

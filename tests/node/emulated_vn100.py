@@ -27,7 +27,7 @@ class Line:
         self._other = other
 
     def send(self, data: bytes) -> None:
-        """Write what fits; the rest is lost, as at a port that is not read. It never waits."""
+        """Write what fits; the rest is lost, as at a port without a reader. It never waits."""
         os.set_blocking(self.end, False)
         with contextlib.suppress(BlockingIOError):
             while data:

@@ -144,7 +144,7 @@ def test_a_line_that_is_pulled_out_is_told_once_and_comes_back(line: Line, tmp_p
 
 
 def test_lines_from_before_it_was_opened_are_not_of_its_first_reading(line: Line) -> None:
-    """A cable that is plugged in before the node looks, on a line that is not read: what does not fit is lost."""
+    """A cable that is plugged in before the node looks, on a line without a reader: what does not fit is lost."""
     turning, still = (line_of(np.array([0.0, 0.0, rate]), np.array([0.0, 0.0, 9.8])) for rate in (0.7, 0.1))
     line.send(turning * 500)
     source = started(line)
