@@ -252,3 +252,11 @@ def test_an_attitude_ends_the_one_before_and_drops_what_was_solved() -> None:
         procedure.solve("2026-01-01", 180.0)
     assert [one.left for one in procedure.progress.attitudes] == [150.0, 180.0]
     assert (tube.phase, procedure.progress.stage) == (TubePhase.REFUSED, RecalibrationStage.COLLECTING)
+
+
+def test_a_block_of_the_same_version_and_another_content_is_not_the_one_that_was_sent() -> None:
+    procedure = uploading(4)
+    procedure.on_block_status(status(4, UploadPhase.APPLIED))
+    procedure.on_sent(Request(4, "parameters", {}), 50)
+    procedure.on_reply(Reply(4, 50, True, "", {"version": 1, "sha256": "ab" * 32}), 3.0)
+    assert procedure.progress.tubes[4].phase is TubePhase.REFUSED
