@@ -16,7 +16,7 @@ from borechain.gauntlet.gauntlet_rig import BIAS_AFTER, GauntletRig
 from node import __main__ as board
 from sim.gauntlet.faulty_stepper import FaultyStepper
 from sim.studies.field.third_world import THIRD
-from sim.studies.soil_link.delivery_time import STEP, quantile
+from sim.studies.soil_link.delivery_time import STEP, LossyJoint, joint_delay, quantile
 from telemetry.runtime.stepped import Due, DueEvent
 
 # a board
@@ -35,11 +35,12 @@ def test_a_board_without_the_package_beside_it_says_so_and_hides_no_other_fault(
         (SimpleNamespace(origin="/elsewhere/telemetry.py"), "/elsewhere/telemetry.py"),
     ):
         monkeypatch.setattr(board, "find_spec", lambda name, found=found: found if name == "telemetry" else 1 / 0)
+        ended: Any
         with pytest.raises(SystemExit if told else ModuleNotFoundError) as ended:
             board.main()
         if told:
             expected = f"python -m node: expected the package telemetry of borechain, got {origin}"
-            assert ended.value.code == expected  # type: ignore[union-attr]
+            assert ended.value.code == expected
 
 
 def test_a_board_runs_its_commands_under_its_name_with_its_packages(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -67,7 +68,7 @@ def test_each_line_is_flushed_once_it_is_whole(monkeypatch: pytest.MonkeyPatch) 
         out = Noted()
         out.done.clear()
         monkeypatch.setattr(sys, "stdout", out)
-        monkeypatch.setattr(rig_command.click, "echo", lambda text: sys.stdout.write(f"{text}\n"))
+        monkeypatch.setattr("click.echo", lambda text: sys.stdout.write(f"{text}\n"))
         rig_command.print_line(line)
         assert out.done == [f"{line}\n"]
 
@@ -181,7 +182,34 @@ def test_a_quantile_is_the_first_time_by_which_the_share_has_come(share: float, 
     assert STEP == 1e-3
 
 
+@pytest.mark.parametrize("attempts", [1, 3])
+def test_all_messages_over_a_joint_come_at_their_times_and_the_rest_at_the_end(attempts: int) -> None:
+    """A frame is sent at 0, 0.06, 0.18, 0.42 s and so on up to 2 s apart; each of its attempts fails by itself."""
+    failing, at, gap, sent = 0.7, 0.0, 0.06, 0
+    expected: dict[int, float] = {}
+    while at < 40.0:
+        for attempt in range(attempts):
+            place = round((at + 0.01 + attempt * 0.004) / 1e-3)
+            if place < 40_000:
+                expected[place] = failing ** (sent * attempts + attempt) * (1.0 - failing)
+        at, gap, sent = at + gap, min(2.0 * gap, 2.0), sent + 1
+    found = joint_delay(LossyJoint((failing, failing), attempts, 0.004, 0.01, 0.0))
+    assert found.sum() == pytest.approx(1.0, abs=1e-12)
+    places = np.flatnonzero(found[:-1])
+    assert {int(k): float(found[k]) for k in places} == pytest.approx(expected, abs=1e-15)
+
+
 # benchmarks
+
+
+def noting(noted: list[Any], answer: Any) -> Any:
+    """What notes the one argument that it is given."""
+
+    def note(given: Any) -> Any:
+        noted.append(given)
+        return answer
+
+    return note
 
 
 def test_a_call_is_timed_by_the_time_of_this_thread_over_all_its_arguments() -> None:
@@ -196,7 +224,12 @@ def test_a_call_is_timed_by_the_time_of_this_thread_over_all_its_arguments() -> 
     ours = node.OurCalls(stretch)
     done: list[Any] = []
     node.offer_aiding = lambda *given: done.append(("offer", *given))
-    node.run_cycle = lambda *given: (done.append(("cycle", *given)), clock.taking(4.0)())
+
+    def run_cycle(*given: Any) -> None:
+        done.append(("cycle", *given))
+        clock.now += 4.0
+
+    node.run_cycle = run_cycle
     ours.arguments = [(("heard",), ("read", 1)), (None, ("read", 2))]
     assert ours.seconds() == 4.0
     assert done == [("offer", 7.0, 2.0, "heard"), ("cycle", 7.0, 2.0, "read", 1), ("cycle", 7.0, 2.0, "read", 2)]
@@ -207,7 +240,7 @@ def test_a_campaign_is_that_of_wellbore_one_and_each_ratio_has_its_own_two_figur
     campaign = bench("campaign")
     assert FOLDER.parent == campaign.ROOT
     loaded: list[Any] = []
-    campaign.load_scenario = lambda path: loaded.append(path) or "scenario"
+    campaign.load_scenario = noting(loaded, "scenario")
     campaign.OneRun = lambda scenario: scenario
     campaign.node_cycles = lambda one: {"drawn": 3.0, "bare": 2.0, "whole": 5.0, "columns": 1e-6}
     campaign.pool_time = lambda scenario, processes: {1: 11.0, 2: 7.0}[processes]
@@ -258,7 +291,12 @@ def test_positions_of_a_survey_and_those_of_its_peer_are_of_the_same_well(monkey
     monkeypatch.setitem(sys.modules, "welleng", header)
     monkeypatch.setitem(sys.modules, "wellpathpy", SimpleNamespace(deviation=deviation))
     pairs: list[Any] = []
-    monkeypatch.setattr(survey, "compare", lambda ours, peer: pairs.append((ours, peer)) or {"ours": float(len(pairs))})
+
+    def compare(ours: Any, peer: Any) -> dict[str, float]:
+        pairs.append((ours, peer))
+        return {"ours": float(len(pairs))}
+
+    monkeypatch.setattr(survey, "compare", compare)
     monkeypatch.setattr(survey, "alternating", lambda ours, peer: {"ours": 30.0})
     monkeypatch.setattr(survey, "batch", lambda tool, site: {"ours": 40.0})
     monkeypatch.setattr(survey, "append_time", lambda: 50.0)
@@ -277,3 +315,51 @@ def test_positions_of_a_survey_and_those_of_its_peer_are_of_the_same_well(monkey
     legs = 0.5 * np.diff(md) * np.tan(bends / 2.0) / (bends / 2.0)
     ends = np.cumsum(legs[:, None] * (tangents[1:] + tangents[:-1]), axis=0)
     assert np.asarray(path())[1:] == pytest.approx(ends, abs=1e-6)
+
+
+def test_of_two_that_alternate_the_ratio_is_that_of_pairs_with_its_quartiles() -> None:
+    node = bench("node")
+    node.BLOCKS = 5
+    ours, peer = iter([99.0, 1.0, 2.0, 4.0, 1.0, 2.0]), iter([99.0, 3.0, 2.0, 20.0, 7.0, 18.0])
+    row = node.alternating(lambda: next(ours), lambda: next(peer), 1.5)  # ratios 3, 1, 5, 7, 9
+    assert (row["ours"], row["peer"], row["ratio"], row["ratio_quartiles"]) == (2.0, 7.0, 5.0, [3.0, 7.0])
+    assert (row["ours_to_peer"], row["at_most"]) == (0.2, 1.5)
+    assert row["ours_to_peer_quartiles"] == pytest.approx([1.0 / 7.0, 1.0 / 3.0])
+
+
+def test_a_bare_kernel_has_every_cycle_of_every_tube_and_what_a_tape_has_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    campaign, done = bench("campaign"), list[Any]()
+    schedule: Any = SimpleNamespace(
+        ends=np.array([1.0, 2.0, 3.0]), begins=np.array([0.0, 1.0, 2.0]), powered=np.array([1, 2, 2]),
+        joined=np.array([[1.0, 0.0], [0.5, 0.0], [0.0, 1.0]]), is_sent=np.array([True, False, True]),
+        measured=np.arange(3 * 12, dtype=float).reshape(3, 12),
+    )  # fmt: skip
+    hops = [SimpleNamespace(error=0.0, loses=0) for _ in range(2)]
+    drawn: Any = SimpleNamespace(readings=np.zeros((2, 1, 6)))
+
+    def draw(_drawn: Any, _nothing: Any, _schedule: Any, _hops: Any, cycle: int) -> None:
+        for k in range(2):
+            drawn.readings[k, 0] = 10.0 * cycle + k + np.arange(6) / 10.0
+            hops[k].error, hops[k].loses = cycle + 0.25 * k, int(cycle == 2 and k == 1)
+
+    monkeypatch.setattr(campaign, "draw_readings", draw)
+    tape = campaign.Tape(np.zeros((3, 2, 6)), np.zeros((3, 2)), np.zeros((3, 2), int))
+    campaign.record.py_func(schedule, drawn, hops, tape)
+    assert tape.readings[:, :, 0].tolist() == [[0.0, 0.0], [10.0, 11.0], [20.0, 21.0]]
+    assert (tape.errors.tolist(), tape.loses.tolist()) == (
+        [[0.0, 0.0], [1.0, 1.25], [2.0, 2.25]],
+        [[0, 0], [0, 0], [0, 1]],
+    )
+    nodes = [SimpleNamespace(filter=f"filter {k}", config=f"config {k}") for k in range(2)]
+    told = [SimpleNamespace(drive_angle=0.1 + k, drive_var=0.2, lower_angle=0.3, lower_var=0.4) for k in range(2)]
+    monkeypatch.setattr(campaign, "run_cycle", lambda *given: done.append((given[0], *given[4:])))
+    monkeypatch.setattr(campaign, "offer_aiding", lambda *given: done.append(("offer", given[0], *given[4:6])))
+    for is_drawn in (True, False):  # drawn anew, or from the tape
+        done.clear()
+        campaign.kernels.py_func(is_drawn, nodes, told, schedule, drawn, hops, tape)
+        systematic = [float(schedule.measured[k][campaign.A_SYSTEMATIC]) for k in (0, 2)]
+        assert done == [
+            ("filter 0", 0.0, 1.0, 1), ("offer", "filter 0", pytest.approx(systematic[0] + 0.2), pytest.approx(0.1)),
+            ("filter 0", 1.0, 2.0, 1), ("filter 1", 1.0, 2.0, 0), ("filter 0", 2.0, 3.0, 0), ("filter 1", 2.0, 3.0, 1),
+            ("offer", "filter 1", pytest.approx(systematic[1] + 0.2), pytest.approx(1.1)),
+        ]  # fmt: skip

@@ -174,7 +174,8 @@ def test_a_recorder_asks_for_what_it_lacks(door: Door) -> None:
     newest = door.rig.ground.tape.newest
     assert newest >= 3
     for since, count in ((None, newest), ("0", newest), (str(newest - 2), 2), (str(newest), 0), ("999999", 0)):
-        query = NotedQuery("borechain/rig-1/intake", **({} if since is None else {"since": since}))
+        asked: dict[str, Any] = {} if since is None else {"since": since}
+        query = NotedQuery("borechain/rig-1/intake", **asked)
         door.ask(query, within="borechain/rig-1/intake")
         ((key, payload, encoding),) = query.replies
         assert (key, encoding, query.finished) == ("borechain/rig-1/intake", "application/msgpack", 1)

@@ -23,6 +23,8 @@ from telemetry.messages import Stand
 
 # tables
 
+SERVER: Any = postgresql.dialect()  # type: ignore[no-untyped-call]
+
 SCHEMA = {  # by table: columns, * of the primary key, ? that may be empty
     "meta": "*name:VARCHAR(32) value:VARCHAR(64)",
     "messages": "*id:SERIAL tube:INTEGER sequence:BIGINT content:VARCHAR(32) kind:VARCHAR(16) ?md:FLOAT ?below:FLOAT "
@@ -42,7 +44,7 @@ def test_tables_are_those_that_every_released_version_reads() -> None:
     """As a server makes them, which counts a key by itself where it is not told that the number is given."""
     found = {}
     for table in tables.METADATA.sorted_tables:
-        made = str(CreateTable(table).compile(dialect=postgresql.dialect()))
+        made = str(CreateTable(table).compile(dialect=SERVER))
         columns = []
         for column in table.columns:
             mark = "*" if column.primary_key else "?" if column.nullable else ""
@@ -54,7 +56,7 @@ def test_tables_are_those_that_every_released_version_reads() -> None:
     assert [[column.name for column in one.columns] for one in unique] == [["tube", "sequence", "content"]]
     assert (tables.SCHEMA, tables.READABLE) == (5, (2, 3, 4, 5))
     assert [table.name for table in tables.DIGESTED] == ["stands", "joints", "setup"]
-    conflict = {name: str(tables.add_new(name).compile(dialect=postgresql.dialect())) for name in ("postgresql",)}
+    conflict = {name: str(tables.add_new(name).compile(dialect=SERVER)) for name in ("postgresql",)}
     assert conflict["postgresql"].endswith("ON CONFLICT DO NOTHING")
 
 
@@ -140,13 +142,31 @@ def test_a_database_is_durable_patient_and_small_and_leaves_nothing_open(
     assert asked == {"journal_mode": "wal", "synchronous": 2, "busy_timeout": 5000, "cache_size": -256}
     opened: list[sqlite3.Connection] = []
     database_room._sqlite_dialect.cache_clear()
-    real = sqlite3.connect
-    monkeypatch.setattr("sqlite3.dbapi2.connect", lambda *a, **k: opened.append(real(*a, **k)) or opened[-1])
+    real: Any = sqlite3.connect
+
+    def connect(*given: Any, **named: Any) -> sqlite3.Connection:
+        opened.append(real(*given, **named))
+        return opened[-1]
+
+    monkeypatch.setattr("sqlite3.dbapi2.connect", connect)
     assert database_room._sqlite_dialect() is database_room._sqlite_dialect()
     for one in opened:
         with pytest.raises(sqlite3.ProgrammingError, match="closed"):
             one.execute("SELECT 1")
     assert len(opened) == 1
+
+
+def test_a_database_that_refused_is_opened_anew(tmp_path: Path) -> None:
+    """A connection of a file that could not be written stays so."""
+    with contextlib.closing(Store(url(tmp_path))) as store:
+        for turn in range(2):
+            before = store._engine.pool
+            with pytest.raises(StoreError, match="cannot"), store._writing():
+                raise OSError("cannot")
+            assert store._engine.pool is not before
+            assert "cannot" in store.refusal
+            store.add_message(survey(1, 1 + turn), None)
+            assert store.refusal == ""
 
 
 @pytest.mark.parametrize("address", ["nonsense", "mysql://u:secret@h/d"])
@@ -206,7 +226,7 @@ def test_a_merge_that_fails_leaves_nothing_of_its_own_and_all_that_was_there(
     for one, other in ((first, tmp_path / "nowhere"), (tmp_path / "nowhere", first)):
         with pytest.raises(ConfigurationError, match=r"nowhere: expected the folder of a ground station"):
             merge_databases(one, other, into)
-    (into / "ground.sqlite").write_text("somebody's")
+    (into / "ground.sqlite").write_text("another")
     with pytest.raises(ConfigurationError, match="it would be written over"):
         merge_databases(first, first, into)
-    assert (into / "ground.sqlite").read_text() == "somebody's"
+    assert (into / "ground.sqlite").read_text() == "another"

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from groundstation.errors import LeaseError
 from groundstation.gateway import lease as lease_room
 from groundstation.gateway.lease import VALID, RigLease, holder_name, lease_refusal
 from groundstation.gateway.leased_process import LeasedProcess
@@ -112,7 +113,7 @@ def test_a_second_ground_station_is_refused_by_the_name_of_the_first(monkeypatch
     monkeypatch.setattr(lease_room, "PATIENCE", 0.0)
     bus = Tokens()
     bus.others = [OLD]
-    with pytest.raises(lease_room.LeaseError, match="rig rig-9: process 77 on there is its ground station"):
+    with pytest.raises(LeaseError, match="rig rig-9: process 77 on there is its ground station"):
         RigLease(bus, "rig-9", lambda: bus, lambda: 0.0)
     assert bus.own == []
     names = sorted(holder_name() for _ in range(3))
@@ -132,7 +133,7 @@ def test_every_event_is_handed_on_as_it_came_and_only_while_the_lease_stands() -
             return lambda *given: done.append((name, *given))
 
     lease = SimpleNamespace(is_deaf=False, is_lost=False, trouble="")
-    process = LeasedProcess(Ground(), lease)  # type: ignore[arg-type]
+    process: Any = LeasedProcess(Ground(), lease)  # type: ignore[arg-type]
     assert process.endpoint == "its endpoint"
     events: list[tuple[str, tuple[Any, ...]]] = [
         ("on_frame", (Side.LOWER, b"frame", 5.0, 3.5)), ("on_cycle", ("data", 5.0)), ("on_overrun", (2, 5.0)),

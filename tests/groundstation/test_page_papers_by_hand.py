@@ -40,7 +40,7 @@ def test_papers_of_a_report_are_named_and_one_line_each(asked: dict[str, str], s
 
 def test_what_cannot_be_exported_is_refused_before_anything_is_made() -> None:
     model: Any = SimpleNamespace(wall=None, config=SimpleNamespace(hole="", rig="rig-7"))
-    refused = (
+    refused: tuple[tuple[str, str, dict[str, str]], ...] = (
         ("tube", "las", {}, 404),
         ("hole", "doc", {}, 404),
         ("hole", "las", {"x": "y"}, 400),
@@ -60,8 +60,17 @@ def test_a_file_has_the_name_of_its_hole_and_the_ending_of_its_format(
 ) -> None:
     model: Any = SimpleNamespace(wall=None, config=SimpleNamespace(hole=hole, rig="rig-7"))
     done: list[Any] = []
-    monkeypatch.setattr(exports, "live_site", lambda *given: done.append(given[:3]) or ("site", "one"))
-    monkeypatch.setattr(exports, "exported_bytes", lambda *given: done.append(given) or b"made")
+
+    def live_site(*given: Any) -> tuple[str, str]:
+        done.append(given[:3])
+        return "site", "one"
+
+    def exported(*given: Any) -> bytes:
+        done.append(given)
+        return b"made"
+
+    monkeypatch.setattr(exports, "live_site", live_site)
+    monkeypatch.setattr(exports, "exported_bytes", exported)
     found = asyncio.run(exports.live_export(model, "hole", form, {"origin": "1,2,3"}))
     assert found == (name, {"las": "text/plain", "witsml": "application/xml"}[form], b"made")
     assert done == [(model, "hole", {"origin": "1,2,3"}), ("site", form, "one")]

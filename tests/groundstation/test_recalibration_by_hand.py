@@ -65,6 +65,10 @@ def record(tube: int, command: int, begun: float, ended: float, *, moved: bool =
     )  # fmt: skip
 
 
+def stage_of(procedure: FieldProcedure) -> RecalibrationStage:
+    return procedure.progress.stage
+
+
 def block_of(tube: int, version: int) -> ParameterBlock:
     return ParameterBlock(tube, version)
 
@@ -127,7 +131,7 @@ def test_a_record_that_moved_is_asked_for_again_and_the_newest_good_one_counts()
             assert asked(procedure, 100.0 * place + turn) == [(4, "static_record")]
             number = 10 + 10 * place + turn
             procedure.on_sent(Request(4, "static_record", {"seconds": 8.0}), number)
-            procedure.on_static_record(record(4, 999, 510.0, 518.0))  # nobody asked for it
+            procedure.on_static_record(record(4, 999, 510.0, 518.0))  # of an order that was not given
             begun = 510.0 + 100.0 * place
             procedure.on_static_record(record(4, number, begun, begun + 8.0, moved=not turn))
             assert tube.detail == ("" if turn else "a record moved")
@@ -151,7 +155,7 @@ def uploading(*tubes: int) -> FieldProcedure:
         answer(procedure, tube.tube, 0.0, tube.tube, block_of(tube.tube, 0))
         tube.proposed, tube.phase, tube.calibration = block_of(tube.tube, 1).canonical().hex(), TubePhase.PROPOSED, "{}"
     procedure.confirm()
-    assert procedure.progress.stage is RecalibrationStage.COLLECTING  # nothing is proposed yet
+    assert stage_of(procedure) is RecalibrationStage.COLLECTING  # nothing is proposed yet
     procedure.progress.stage, procedure.progress.proposal = RecalibrationStage.SOLVED, "p"
     assert not procedure.uploads_to(tubes[0])
     procedure.confirm()
@@ -177,20 +181,20 @@ def test_it_is_done_when_the_last_tube_tells_its_hash_or_has_refused() -> None:
     assert phases[4].phase is TubePhase.UPLOADING
     procedure.on_block_status(status(4, UploadPhase.REFUSED))
     assert (phases[4].phase, phases[4].detail) == (TubePhase.REFUSED, "upload refused: too old")
-    assert procedure.progress.stage is RecalibrationStage.UPLOADING
+    assert stage_of(procedure) is RecalibrationStage.UPLOADING
     procedure.on_block_status(status(7, UploadPhase.APPLIED), has_surveyed=True)
     procedure.on_block_status(status(7, UploadPhase.APPLIED), has_surveyed=True)
     assert (phases[7].phase, procedure.progress.mixed) == (TubePhase.VERIFYING, [7])
     assert asked(procedure, 2.0) == [(7, "parameters")]
     answer(procedure, 7, 3.0, 50, block_of(7, 1))
     assert (phases[7].phase, phases[7].hash) == (TubePhase.DONE, block_of(7, 1).sha256().hex())
-    assert procedure.progress.stage is RecalibrationStage.DONE
+    assert stage_of(procedure) is RecalibrationStage.DONE
     assert asked(procedure, 100.0) == []
     both = uploading(4, 7)
     for tube in (4, 7):
-        assert both.progress.stage is RecalibrationStage.UPLOADING
+        assert stage_of(both) is RecalibrationStage.UPLOADING
         both.on_block_status(status(tube, UploadPhase.UNTRUSTED))
-    assert both.progress.stage is RecalibrationStage.DONE
+    assert stage_of(both) is RecalibrationStage.DONE
     other = uploading(4)
     other.on_block_status(status(4, UploadPhase.APPLIED))
     answer(other, 4, 3.0, 50, block_of(4, 9))
@@ -241,10 +245,18 @@ def test_an_attitude_ends_the_one_before_and_drops_what_was_solved() -> None:
         tube.found = Found(0.1, (0.2, 0.3, 0.4), 0.5, 6.0, 0.7, 0.8)
         procedure.attitude(0.1, 0.2, 8.0, at)
         assert (procedure.progress.stage, procedure.progress.proposal) == (RecalibrationStage.COLLECTING, "")
-        told = tube.phase, tube.proposed, tube.found, tube.calibration, tube.detail
+        told: tuple[Any, ...] = (tube.phase, tube.proposed, tube.found, tube.calibration, tube.detail)
         assert told == (TubePhase.COLLECTING, "", None, "", "")
         assert [one.left for one in procedure.progress.attitudes] == [150.0, None][1 - turn :]
     with pytest.raises(SelectorError, match="tube 4: block in use: expected one that this ground station has sent"):
         procedure.solve("2026-01-01", 180.0)
     assert [one.left for one in procedure.progress.attitudes] == [150.0, 180.0]
     assert (tube.phase, procedure.progress.stage) == (TubePhase.REFUSED, RecalibrationStage.COLLECTING)
+
+
+def test_a_block_of_the_same_version_and_another_content_is_not_the_one_that_was_sent() -> None:
+    procedure = uploading(4)
+    procedure.on_block_status(status(4, UploadPhase.APPLIED))
+    procedure.on_sent(Request(4, "parameters", {}), 50)
+    procedure.on_reply(Reply(4, 50, True, "", {"version": 1, "sha256": "ab" * 32}), 3.0)
+    assert procedure.progress.tubes[4].phase is TubePhase.REFUSED

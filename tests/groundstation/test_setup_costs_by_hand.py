@@ -13,7 +13,7 @@ import pytest
 from test_setup_by_hand import DEG, K, book_of, told
 
 from groundstation.service.setup import readiness
-from groundstation.service.setup.setup_items import SetupItem, SetupSource, joint_item, missing_names
+from groundstation.service.setup.setup_items import SetupItem, joint_item, missing_names
 from groundstation.service.setup.setup_priors import (
     setup_priors,
 )
@@ -21,6 +21,7 @@ from groundstation.service.setup.toe_costs import course_of, designed_course, to
 from groundstation.service.setup.told_value import (
     DRIVE,
     SetupKind,
+    SetupSource,
     item_name,
 )
 from telemetry.messages import UNKNOWN_YAW_STD, NodeFlag
@@ -148,7 +149,8 @@ def test_a_joint_of_which_nobody_has_spoken_is_no_item(tmp_path: Path) -> None:
     assert untold is not None
     assert known is not None
     assert (untold.sigma, untold.is_missing, untold.is_needed) == (UNKNOWN_YAW_STD, True, True)
-    assert (known.sigma, known.is_missing) == (pytest.approx(0.05 * DEG), False)
+    assert known.sigma == pytest.approx(0.05 * DEG)
+    assert not known.is_missing
     assert untold.detail == "the node of tube 4 was not told: the yaw below may be any"
     book.on_flags(4, 1, NodeFlag.DRIVE_UNTOLD)
     head = joint_item(book, (DRIVE, 4))

@@ -116,7 +116,8 @@ def test_rig_time_is_followed_epoch_by_epoch_and_says_how_long_a_state_was_on_it
         (6, 97.5, NodeFlag.NONE, False, 0.0), (4, 97.5, NodeFlag.CLOCK_UNSYNCHRONISED, False, 0.0),
     ):  # fmt: skip
         state = replace(node_state(1, at, 5), epoch=epoch, flags=flags)
-        assert (time.is_dated(state), time.time_on_its_way(state)) == (dated, pytest.approx(away))
+        assert time.is_dated(state) == dated
+        assert time.time_on_its_way(state) == pytest.approx(away)
     for epoch in range(6, 13):
         time.follow_rig_time(1.0, epoch)
     known = [epoch for epoch in range(4, 13) if time.is_dated(replace(node_state(1, 1.0, 5), epoch=epoch))]
@@ -319,7 +320,7 @@ def test_a_stand_is_a_stop_that_lies_deeper_or_follows_one_too_short_and_not_whe
             assert len(list(stops)) == 1 + (stops_there or too_short)
     log, stops = DepthLog(RATE, GAP), Stops(tally(9, 8, 7), DUE)
     take_stand(log, stops, Stand(1, 100.0, 140.0, 3.0))
-    assert list(stops) == []  # nobody has surveyed in it, and the encoder had never started before
+    assert list(stops) == []  # without a survey in it, and of an encoder that had never started before
     for at in (97.9, 142.1):
         take_survey(log, stops, 1, at)
         assert list(stops) == []
