@@ -73,6 +73,17 @@ def test_every_byte_that_is_changed_is_told(signed: Signed) -> None:
             verify(signed, bytes(changed))
 
 
+def test_a_certificate_whose_number_was_changed_to_one_below_zero_is_no_signature(signed: Signed) -> None:
+    """Which bit that is depends on the number, so the bytes above meet it in some runs and not in others."""
+    number = verify_report(signed.once, signed.folder / "ca.pem")[0].serial
+    written = number.to_bytes(number.bit_length() // 8 + 1, "big")
+    negative = bytes([written[0] | 0x80]) + written[1:]
+    changed = signed.once.replace(written.hex().encode(), negative.hex().encode(), 1)
+    assert changed != signed.once
+    with pytest.raises(SignedFileError, match="it was changed: signature 1, anna, is no signature"):
+        verify(signed, changed)
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [
