@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -60,6 +61,15 @@ def test_who_signed_when_is_told(signed: Signed) -> None:
     assert verify(signed, signed.twice) == ["anna", "operator"]
     assert signed.once.startswith(signed.plain)
     assert signed.twice.startswith(signed.once)
+
+
+def test_the_newest_catalog_lists_every_signature(signed: Signed) -> None:
+    """Other programs look there for the fields of signatures, and see those alone."""
+    listed = [re.findall(rb"(\d+) 0 R", fields) for fields in re.findall(rb"/Fields\[([^\]]*)\]", signed.twice)]
+    assert [len(fields) for fields in listed] == [1, 2]
+    assert listed[0][0] == listed[1][0]
+    for field in listed[1]:
+        assert re.search(rb"\n%b 0 obj\n<</FT/Sig/" % field, signed.twice)
 
 
 def test_every_byte_that_is_changed_is_told(signed: Signed) -> None:
