@@ -91,7 +91,7 @@ def surroundings() -> dict[str, str]:
 
 
 def pip(python: Path, *words: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "pip", "--python", python, "install", "--quiet", *words]
+    command = [sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-compile", *words]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=240)
 
 

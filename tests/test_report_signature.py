@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -62,6 +63,15 @@ def test_who_signed_when_is_told(signed: Signed) -> None:
     assert signed.twice.startswith(signed.once)
 
 
+def test_the_newest_catalog_lists_every_signature(signed: Signed) -> None:
+    """Other programs look there for the fields of signatures, and see those alone."""
+    listed = [re.findall(rb"(\d+) 0 R", fields) for fields in re.findall(rb"/Fields\[([^\]]*)\]", signed.twice)]
+    assert [len(fields) for fields in listed] == [1, 2]
+    assert listed[0][0] == listed[1][0]
+    for field in listed[1]:
+        assert re.search(rb"\n%b 0 obj\n<</FT/Sig/" % field, signed.twice)
+
+
 def test_every_byte_that_is_changed_is_told(signed: Signed) -> None:
     """All of what the signatures appended, and a sample of the report itself, a bit at a time."""
     lot = random.Random(7)
@@ -71,6 +81,17 @@ def test_every_byte_that_is_changed_is_told(signed: Signed) -> None:
         changed[place] ^= 1 << lot.randrange(8)
         with pytest.raises(SignedFileError):
             verify(signed, bytes(changed))
+
+
+def test_a_certificate_whose_number_was_changed_to_one_below_zero_is_no_signature(signed: Signed) -> None:
+    """Which bit that is depends on the number, so the bytes above meet it in some runs and not in others."""
+    number = verify_report(signed.once, signed.folder / "ca.pem")[0].serial
+    written = number.to_bytes(number.bit_length() // 8 + 1, "big")
+    negative = bytes([written[0] | 0x80]) + written[1:]
+    changed = signed.once.replace(written.hex().encode(), negative.hex().encode(), 1)
+    assert changed != signed.once
+    with pytest.raises(SignedFileError, match="it was changed: signature 1, anna, is no signature"):
+        verify(signed, changed)
 
 
 @pytest.mark.parametrize(

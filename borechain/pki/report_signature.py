@@ -136,10 +136,11 @@ def _parts_of(signature: bytes) -> tuple[x509.Certificate, bytes, bytes]:
     (signer,) = _elements(signers)
     (der,) = _elements(certificates)
     *_, attributes, _, signed = _elements(signer)
-    with warnings.catch_warnings():  # of a number that was changed to one below zero, which is refused just below
+    with warnings.catch_warnings():  # of a number that was changed to one below zero, whenever it is read
         warnings.simplefilter("ignore", CryptographyDeprecationWarning)
         holder = x509.load_der_x509_certificate(der)
-    if _packed(holder, der, attributes, signed) != whole or signature[end:].strip(b"\0"):
+        is_numbered = holder.serial_number > 0
+    if not is_numbered or _packed(holder, der, attributes, signed) != whole or signature[end:].strip(b"\0"):
         raise ValueError("another form of signature")
     return holder, attributes, _inside(signed)
 
