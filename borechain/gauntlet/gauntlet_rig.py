@@ -91,7 +91,9 @@ class GauntletRig:
         self.inline = InlineRig(
             world, settings, "rig-1", folder, lambda below: int(lots.integers(below)), disk_of=self.disk, keys=keys
         )
-        self.stepper = self.inline.stepper = FaultyStepper(self.inline.stepper.builders, world, self.cut)
+        self.stepper = self.inline.stepper = FaultyStepper(
+            self.inline.stepper.builders, world, self.cut, self._start_anew
+        )
         self._builders = dict(self.stepper.builders)
         self._folder, self._seed, self._strangers = folder, seed, itertools.count()
         self.off: dict[int, float] = {}  # since when (s), by address
@@ -164,6 +166,14 @@ class GauntletRig:
         """Power everything on at a rig time (s)."""
         self._look_at = at + LOOK_EVERY
         self.scheduler.begin(at)
+
+    def _start_anew(self, address: int) -> None:
+        """What starts a process again that has ended with an error (systemd, docker) does so."""
+        for listener in self.before_cut:
+            listener()
+        self.stepper.processes[address].close()
+        self.stepper.drop(address)
+        self.stepper.follow(self.scheduler.progress)
 
     def freeze(self, address: int) -> None:
         """Freeze a process: it gets no events."""

@@ -19,6 +19,7 @@ from telemetry.messages import BASE
 
 ALWAYS = frozenset({"setup", "unchecked"})  # doubts of a verdict: the gauntlet's crew checks no north
 OF_ONE_TUBE = frozenset({"uncertain", "yaw", "no_survey"})  # where a tube has lost what it knew
+AVERAGED = 21.0  # s into a stop, by which its survey is made
 OF_DECEPTION = frozenset({"contradiction", "uncertain", "depth"})  # where what is measured or told is wrong to the end
 Row = dict[str, Any]
 
@@ -44,14 +45,44 @@ def unready_tubes(rig: GauntletRig) -> set[int]:
     return {tube for tube, at in rig.forgot_at.items() if max(at, rig.spoiled_until.get(tube, at)) > since}
 
 
+def odd_tubes(rig: GauntletRig) -> set[int]:
+    """Tubes whose force is not of gravity's size, since before the survey of the last stop was made and to its end.
+
+    Gravity has one size, however a tube leans. A node that stands still must not average another force: what is left of
+    the stop once it knows that is too short for a second average. So no survey is owed; that it is missing, or of no
+    gravity, is to be told.
+    """
+    stop = next(phase for phase in reversed(rig.world.phases) if phase.kind == "stop")
+    made = stop.start + AVERAGED
+    return {tube for tube, (since, until) in rig.world.odd.items() if since < made and until > stop.end}
+
+
 def _unsurveyed(rig: GauntletRig) -> Iterator[tuple[int, str]]:
     """Tubes whose survey of the last stop is not there once, or not fully believed, and what is there."""
     if "depth" in misled_by(rig.world.deceptions):
         return  # where it stood is told wrongly to the end
+    odd = odd_tubes(rig)
     for tube in set(TUBES) - unready_tubes(rig):
-        found = [row["trust"] for row in _measured(rig, tube) if is_at_place((tube, row["md_m"]), [_place(rig, tube)])]
-        if found != ["full"]:
+        rows = [row for row in _measured(rig, tube) if is_at_place((tube, row["md_m"]), [_place(rig, tube)])]
+        found = [row["trust"] for row in rows]
+        if tube in odd:
+            if any("gravity" not in row["quality"] for row in rows) or not (rows or _is_told_missing(rig, tube)):
+                yield tube, f"{' and '.join(found) or 'no survey'} of an odd force, which is not told,"
+        elif found != ["full"]:
             yield tube, " and ".join(found) or "no survey"
+
+
+def _is_told_missing(rig: GauntletRig, tube: int) -> bool:
+    """Whether an alarm says that the survey of a tube at the last stop is missing."""
+    return any(
+        row["code"] == "survey_missing" and _is_of_last_stop(rig, row) and tube in _numbers(row["detail"])
+        for row in rig.inline.ask("alarms")["rig"]
+    )
+
+
+def _is_of_last_stop(rig: GauntletRig, row: Row) -> bool:
+    """Whether a survey that is missing is one of the last stop."""
+    return abs(float(row["subject"].split()[2]) - rig.world.bit_depth(rig.world.end)) <= DEPTH_TOLERANCE
 
 
 def _doubts_left(rig: GauntletRig) -> set[str]:
@@ -76,10 +107,8 @@ def _was_missed(rig: GauntletRig, row: Row) -> bool:
     places = [(tube, md - TUBE_LENGTH * (tube - 1)) for tube in tubes]
     if any(is_at_place((tube, one["md_m"]), places) for tube in tubes for one in _measured(rig, tube)):
         return False
-    is_last = abs(md - rig.world.bit_depth(rig.world.end)) <= DEPTH_TOLERANCE
-    return (
-        not is_last or set(_numbers(row["detail"])) <= unready_tubes(rig) or "depth" in misled_by(rig.world.deceptions)
-    )
+    could_not = unready_tubes(rig) | odd_tubes(rig)
+    return not _is_of_last_stop(rig, row) or set(tubes) <= could_not or "depth" in misled_by(rig.world.deceptions)
 
 
 def _was_untrusted(rig: GauntletRig, row: Row) -> bool:

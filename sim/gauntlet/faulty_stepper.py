@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping
 
+from groundstation.errors import StoreError
 from sim.gauntlet.faulty_disk import PowerCutError
 from sim.gauntlet.faulty_world import FaultyWorld
 from sim.rig.in_process import Build, InProcessStepper, step_process
@@ -26,11 +27,18 @@ class FaultyStepper(InProcessStepper):
     builders : how to start the process of each address
     world : whose depth may be hidden
     on_cut : called with the address of a process whose power went while it wrote
+    on_end : called with the address of one that has ended because it has to start anew
     """
 
-    def __init__(self, builders: Mapping[int, Build], world: FaultyWorld, on_cut: Callable[[int], None]) -> None:
+    def __init__(
+        self,
+        builders: Mapping[int, Build],
+        world: FaultyWorld,
+        on_cut: Callable[[int], None],
+        on_end: Callable[[int], None],
+    ) -> None:
         super().__init__(builders)
-        self._world, self._on_cut = world, on_cut
+        self._world, self._on_cut, self._on_end = world, on_cut, on_end
         self._frozen: dict[int, deque[FrameEvent]] = {}
         self._thawing: dict[int, deque[FrameEvent]] = {}
         self._missed: dict[int, int] = {}
@@ -85,6 +93,8 @@ class FaultyStepper(InProcessStepper):
                     answers[address] = step_process(self.processes[address], events)
             except PowerCutError:
                 self._on_cut(address)
+            except StoreError:
+                self._on_end(address)
         return answers
 
     def _events_of(self, address: int, events: list[FrameEvent]) -> list[FrameEvent]:

@@ -21,6 +21,8 @@ from telemetry.messages import ENCODER
 
 TUBE_LENGTH = 2.0  # m
 COUNTS = 4096  # of a turn of the encoder
+ODD_WEIGHT = 0.05  # part of gravity, by which no force of a tube at rest is gravity's, however it leans
+ODD_AGAIN = 5.0  # s between two such forces that are of one time
 COMMON: dict[str, Any] = {
     "rig": {"tubes": 2, "tube_length_m": TUBE_LENGTH, "tubes_at_start": 2},
     "path": {"straight": {"inclination_deg": 3.0, "azimuth_deg": 40.0}},
@@ -64,6 +66,7 @@ class FaultyWorld(World):
     depth_error : m
     depth_hidden : no depth is measured
     deceptions : names of faults that nothing contradicts but the other tubes, at any time
+    odd : since when and until when (s) the force that a deceived tube reads was not of gravity's size, by tube
     misread : rad by which the joints of a tube to head and lower tube are told wrong, by tube
     """
 
@@ -102,6 +105,7 @@ class FaultyWorld(World):
         self.depth_error = 0.0
         self.depth_hidden = False
         self.deceptions: set[str] = set()
+        self.odd: dict[int, tuple[float, float]] = {}
         self.misread: dict[int, tuple[float, float]] = {}
         self._deceivers: dict[int, list[Callable[[Reading], Reading]]] = {}
         self._scales: list[tuple[float, float]] = []  # depth of the bit, m, from which on it counts so much more
@@ -198,8 +202,8 @@ class FaultyWorld(World):
         reading = super().imu_sample(tube, cycle)
         if self._leaned is not None:
             reading = self._in_leaned_hole(reading, tube, cycle)
-        for change in self._deceivers.get(tube, ()):
-            reading = change(reading)
+        if tube in self._deceivers:
+            reading = self._deceived(reading, tube, cycle)
         if tube not in self.spoilers:
             return reading
         self.spoiled = True
@@ -217,6 +221,17 @@ class FaultyWorld(World):
         if t not in self._depths:
             self._depths[t] = super().bit_depth(t)
         return self._depths[t]
+
+    def _deceived(self, reading: Reading, tube: int, cycle: int) -> Reading:
+        """What a tube reads whose readings are changed; noted where its force is not of gravity's size."""
+        for change in self._deceivers[tube]:
+            reading = change(reading)
+        gravity = self.scenario.file.accelerometer.gravity_mps2
+        if abs(math.hypot(*reading[3:6]) - gravity) > ODD_WEIGHT * gravity:
+            now = self.cycle_end(cycle)
+            since, until = self.odd.get(tube, (now, now))
+            self.odd[tube] = since if now <= until + ODD_AGAIN else now, now
+        return reading
 
     def _in_leaned_hole(self, reading: Reading, tube: int, cycle: int) -> Reading:
         """What a tube reads that stands in the hole as it leans now, of what it would have read before."""

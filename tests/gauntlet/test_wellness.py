@@ -34,6 +34,9 @@ def test_a_minute_after_the_last_fault_all_is_well(first: int, count: int) -> No
             ("database-deleted",),
         ),  # a survey came before the first state: no tube was ever known, nothing placed
         (9500007, ("ground-off-across-stop", "same-number")),  # the crew told which tube it is while nothing heard it
+        (9400760, ("ground-cut", "database-old")),  # restored under a running ground station, it took nothing any more
+        (9400895, ("database-old", "depth-jumps-up")),  # the stop that went on after a jump was another, not surveyed
+        (9401004, ("force-creep",)),  # a force of 1.05 g begins an average anew: no survey is owed, the word of it is
     ],
 )
 def test_what_was_not_well_within_a_minute_is(seed: int, kinds: tuple[str, ...]) -> None:

@@ -13,7 +13,7 @@ from sim.gauntlet.faulty_world import TUBE_LENGTH
 from telemetry.messages import BASE
 
 END = 9.0  # m, of the bit, where the last stop is
-DRILLED_ON = 700.0  # s
+DRILLED_ON, STOPPED, LEFT = 700.0, 800.0, 830.0  # s, of the last drilling and of the last stop
 MISLEADS_DEPTH = next(name for name, one in EXPECTED.items() if one.misleads == "depth")
 ANOTHER = next(name for name, one in EXPECTED.items() if one.misleads != "depth")
 
@@ -34,9 +34,10 @@ def well_rig(**change: Any) -> Any:
         "measurements": {"measurements": change.pop("surveys", [survey(tube) for tube in TUBES])},
     }  # fmt: skip
     phases = [
-        SimpleNamespace(kind=kind, start=at) for kind, at in (("drill", 100.0), ("drill", DRILLED_ON), ("stop", 800.0))
+        SimpleNamespace(kind=kind, start=begin, end=end)
+        for kind, begin, end in (("drill", 100.0, 130.0), ("drill", DRILLED_ON, STOPPED), ("stop", STOPPED, LEFT))
     ]
-    world = {"deceptions": (), "slipped": False, "spoiled": False, "bit_depth": lambda _: END, "end": 900.0}
+    world = {"deceptions": (), "odd": {}, "slipped": False, "spoiled": False, "bit_depth": lambda _: END, "end": 900.0}
     world |= {name: change.pop(name) for name in tuple(change) if name in world}
     usual: dict[str, Any] = {
         "off": set(), "forgot_at": {}, "spoiled_until": {}, "stepper": SimpleNamespace(processes={}), "ground": None,
@@ -74,6 +75,28 @@ def test_every_tube_has_surveyed_the_last_stop_once_and_is_believed() -> None:
     assert unwell(surveys=others, forgot_at={first: 899.0}) == []
     assert unwell(surveys=others, deceptions=(MISLEADS_DEPTH,)) == []
     assert unwell(surveys=others, deceptions=(ANOTHER,)) == [f"tube {first}: no survey at the last stop"]
+
+
+@pytest.mark.parametrize(
+    ("since", "until", "is_odd"),
+    [
+        (700.0, 899.0, True), (820.0, 899.0, True), (820.9, 830.1, True), (821.0, 899.0, False),  # it was made by then
+        (810.0, 829.0, False), (700.0, 790.0, False),  # a second average was made in what was left
+    ],
+)  # fmt: skip
+def test_a_tube_whose_force_is_none_of_gravity_owes_no_survey_but_the_word_of_it(
+    since: float, until: float, is_odd: bool
+) -> None:
+    tube, other = TUBES
+    others, odd = [survey(other)], {tube: (since, until)}
+    missing = alarm("survey_missing", f"stop at {END:.2f} m, 2/800 s", f"tubes {tube}")
+    assert (unwell(surveys=others, odd=odd, alarms=[missing]) == []) == is_odd
+    assert unwell(surveys=others, odd=odd) != []
+    assert unwell(surveys=others, odd=odd, alarms=[missing | {"detail": f"tubes {tube}, {other}"}]) != []
+    earlier = missing | {"subject": "stop at 3.00 m, 2/300 s"}
+    assert unwell(surveys=others, odd=odd, alarms=[earlier]) != []
+    for quality, is_well in ((["gravity"], True), (["motion"], not is_odd), ([], not is_odd)):
+        assert (unwell(surveys=[*others, survey(tube) | {"quality": quality}], odd=odd) == []) == is_well
 
 
 @pytest.mark.parametrize(

@@ -182,3 +182,30 @@ def test_two_that_speak_every_second_or_two_are_found_within_ten_states(
 def test_states_without_a_time_are_not_compared(flags: NodeFlag) -> None:
     watch, epoch = NumberWatch(), 4 if flags else EPOCH_UNKNOWN
     assert not any(watch.find_places(state_at(float(n), 1 + n % 2, flags, epoch)) for n in range(20))
+
+
+@pytest.mark.parametrize(
+    ("spoken", "left"),
+    [
+        (((2, 1), (1, 2)), [2, 1]),  # in its place hangs the right tube
+        (((2, 1), (1, 2), (1, 3)), [2, 1001, 1]),  # one more was added above both
+        (((2, 1),), [2, 1001, 1]),  # and nothing below it is heard
+    ],
+)
+def test_what_was_hung_in_by_mistake_gives_way_to_the_tube_in_its_place(
+    tmp_path: Path, spoken: tuple[tuple[int, int], ...], left: list[int]
+) -> None:
+    """A ground station that has lost its database met the stranger first: it has the place of no other tube."""
+    rig = Rig(tmp_path)
+    rig.run(12.0)
+    for hops in (2, 1) * 8:
+        rig.tell(1, hops)
+        rig.run(0.5)
+    rig.ground.operator.order("same_number", {"tube": "1", "which": "lower"}, "anna")
+    assert rig.ground.model.string.tubes == [1001, 1]
+    for _ in range(20):
+        for tube, hops in spoken:
+            rig.tell(tube, hops)
+            rig.run(0.5)
+    assert rig.ground.model.string.tubes == left
+    rig.ground.close()

@@ -1,7 +1,8 @@
 """The database of a ground station, a file or a server: opened, checked, written to durably, named where it refuses.
 
 A disk that refuses leaves what is there readable: a database that cannot be written is opened all the same, and a file
-that was deleted under the running program is noticed before the next commit, which would be lost with it.
+that was deleted under the running program is noticed before the next commit, which would be lost with it. Where a whole
+database lies in its place, a backup that was restored, a ground station that starts anew goes on with that one.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import sqlite3
+import struct
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -31,6 +33,8 @@ from telemetry.runtime.disk import MACHINE, Disk
 
 CACHE_KB = 256  # of pages that a connection keeps: rows come at the end, and the usual 2 MB fill within an hour
 SHOWN = 5  # tables named of a database that is not ours
+HEAD = struct.Struct(">16s H 10x I")  # of a file of SQLite: its name, bytes of a page (1 for 65536), pages
+SQLITE = b"SQLite format 3\0"
 COMPILED: Final[dict[Any, Any]] = {}  # statements for SQLite by their keys; as many as the sources have
 
 
@@ -67,11 +71,11 @@ class Database:
             with self._refusing("; choose a writable --folder or another database"):
                 if self._file is not None:
                     disk.make_folder(self._file.parent)
-                self._begin(self._check_schema())
+                self._begin(self._check_schema(self._engine))
         except StoreError:
             self.close()
             raise
-        self._inode = self._found_inode()
+        self._inode, self._journal = self._found_inode(), self._found_journal()
 
     def _has(self, table: sa.Table) -> bool:
         """Whether there is a table; a database of before that cannot be written lacks the later ones."""
@@ -102,6 +106,50 @@ class Database:
             self._engine.dispose()  # a file that was opened while it could not be written stays so
             raise
         self.refusal = ""
+        self._journal = self._found_journal()
+
+    def check_place(self) -> None:
+        """See that no other database lies in the place of one that takes nothing any more.
+
+        Raises
+        ------
+        StoreError
+            When a whole one of a ground station does: the process has to start anew, to go on with what is there.
+        """
+        if self.refusal and self._found_inode() not in (0, self._inode) and self._is_another_whole():
+            raise StoreError(
+                f"database {self._where}: another one lies in its place; start the ground station again on it"
+            )
+
+    def _is_another_whole(self) -> bool:
+        """Whether the file that has the name of ours now is a database of a ground station, none that is still copied.
+
+        One that is shorter than its head says is not opened: nothing of ours is to be written into it.
+        """
+        if self._file is None:
+            return False
+        self._engine.dispose()
+        looking = _engine_of_file(self._engine.url, self._disk)  # ours would make it durable, which is a change
+        try:
+            name, page, pages = HEAD.unpack(self._disk.read(self._file, 0, HEAD.size))
+            last = (page if page > 1 else 65536) * pages - 1
+            if name != SQLITE or last < 0 or not self._disk.read(self._file, last, 1):
+                return False
+            self._part_from_journal()
+            return bool(self._check_schema(looking))
+        except (struct.error, OSError, sa.exc.SQLAlchemyError):  # a refusal of its schema is an OSError too
+            return False
+        finally:
+            looking.dispose()
+
+    def _part_from_journal(self) -> None:
+        """Give our journal another name: SQLite would read it into whatever file has the name of ours."""
+        if self._file is not None and self._journal and self._found_journal() == self._journal:
+            self._disk.rename(_journal_of(self._file), self._file.with_name(f"{self._file.name}-parted-{self._inode}"))
+
+    def _found_journal(self) -> int:
+        """Identity of the journal beside the file; 0 where there is none."""
+        return self._disk.identity(_journal_of(self._file)) if self._file is not None else 0
 
     def _found_inode(self) -> int:
         """Identity of the file that has the database's name; 0 where there is none, or no file."""
@@ -118,15 +166,15 @@ class Database:
             reason = str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error)
             raise StoreError(f"database {self._where}: {reason}{remedy}") from error
 
-    def _check_schema(self) -> list[str]:
+    def _check_schema(self, engine: sa.Engine) -> list[str]:
         """Look without a change whether the database is one of ours; its tables, none of a new one."""
-        tables = sorted(sa.inspect(self._engine).get_table_names())
+        tables = sorted(sa.inspect(engine).get_table_names())
         if tables and META.name not in tables:
             raise StoreError(
                 f"database {self._where}: expected an empty one or that of a ground station, "
                 f"got tables {', '.join(tables[:SHOWN])}; choose another --folder or database"
             )
-        found = self._meta() if tables else {}
+        found = _meta_of(engine) if tables else {}
         if found and found.get("schema") not in [str(schema) for schema in READABLE]:
             wanted = " or ".join(map(str, READABLE))
             raise StoreError(
@@ -136,8 +184,7 @@ class Database:
         return tables if found else []
 
     def _meta(self) -> dict[str, str]:
-        with self._engine.connect() as connection:
-            return {row.name: row.value for row in connection.execute(ALL_META)}
+        return _meta_of(self._engine)
 
     @staticmethod
     def _replace_meta(connection: sa.Connection, values: Mapping[str, str], without: Iterable[str] = ()) -> None:
@@ -185,6 +232,15 @@ class Database:
         self.boots = boots
         with self._engine.begin() as connection:
             self._replace_meta(connection, {"schema": str(SCHEMA), "boots": str(boots)})
+
+
+def _meta_of(engine: sa.Engine) -> dict[str, str]:
+    with engine.connect() as connection:
+        return {row.name: row.value for row in connection.execute(ALL_META)}
+
+
+def _journal_of(file: Path) -> Path:
+    return file.with_name(f"{file.name}-wal")
 
 
 def _engine_of(url: str, disk: Disk) -> sa.Engine:

@@ -268,6 +268,7 @@ class GroundProcess(Process):
 
     def _look(self, now: float) -> None:
         """Find what is wrong, ask again for what is missing, and publish who fell silent or came back."""
+        self.store.check_place()
         self._keeper.keep_depth_doubt()
         self._place_waiting()
         self._follow_setup()

@@ -122,6 +122,22 @@ class KnownString:
         places = [hops, *(self.tally.place_of(one) for one in self.tally.tubes)]
         if tube < OTHER or tube in self.tally.tubes or len(set(places)) == len(places):
             self.tally.on_hops(tube, hops)
+        if self.doubled:
+            self._take_out_silent()
+
+    def _take_out_silent(self) -> None:
+        """The other of two with one number hangs no more where it is silent, and all others are heard as without it.
+
+        What was hung in by mistake gives way to the right tube; where that is added above it, the places differ.
+        """
+        tally, is_silent = self.tally, self.states.is_stale
+        silent = [tube for tube in tally.tubes if tube > OTHER and is_silent(tube)]
+        rest = [tube for tube in tally.tubes if tube not in silent]
+        places = {tally.place_of(tube) for tube in rest}
+        if silent and not any(map(is_silent, rest)) and places == set(range(1, len(rest) + 1)):
+            for tube in silent:
+                if tally.place_of(tube) in places:
+                    tally.remove(tube)
 
     def on_doubled(self) -> None:
         """Which of two tubes of one number is the tube was told, or taken back: they change names in the string."""

@@ -39,6 +39,11 @@ class Tally:
         """Hop count that a tube has reported last; None of one that has reported none."""
         return self._hops.get(tube)
 
+    def remove(self, tube: int) -> None:
+        """A tube of the string was taken out of it."""
+        self.tubes.remove(tube)
+        self._hops.pop(tube, None)
+
     def exchange(self, one: int, other: int) -> None:
         """Have two tubes of the string change names."""
         names = {one: other, other: one}
