@@ -67,7 +67,7 @@ RIG_STUDIES: Final = by_name(
                 FIRST,
             ),
             counts="rigs",
-            full=("--seeds 264 --rigs 4",),
+            full=("--seeds 1000 --rigs 40",),
             short="--seeds 2 --rigs 2",
         ),
         Study(
