@@ -97,7 +97,8 @@ def test_a_frozen_process_gets_its_frames_when_it_thaws_and_is_told_its_cycles_o
     monkeypatch.setattr(
         "sim.gauntlet.faulty_stepper.step_process", lambda process, events: stepped.append([e[1] for e in events])
     )  # fmt: skip
-    stepper, process = FaultyStepper({}, SimpleNamespace(depth_hidden=False), lambda _: None), Noted()  # type: ignore[arg-type]
+    world, process = SimpleNamespace(depth_hidden=False), Noted()
+    stepper = FaultyStepper({}, world, lambda _: None, lambda _: None)  # type: ignore[arg-type]
     stepper.processes[3] = process  # type: ignore[assignment]
     for begin in (10.0, 50.0):  # and a second time
         stepper.freeze(3)

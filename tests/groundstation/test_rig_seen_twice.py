@@ -117,11 +117,14 @@ def test_a_tube_that_comes_on_top_after_a_restart_finds_its_place_when_all_have_
         ((90.0, 160.0), True),
         ((100.0, 149.9), False),
         ((120.0, 150.0), True),
-        ((151.0, 180.0), True),
+        ((150.0, 180.0), True),
+        ((150.1, 180.0), False),
         ((80.0, 99.0), False),
     ],
 )
-def test_a_stand_is_more_of_a_stop_where_it_does_not_end_before_it(told: tuple[float, float], is_known: bool) -> None:
+def test_a_stand_is_more_of_a_stop_that_it_touches_where_it_does_not_end_before_it(
+    told: tuple[float, float], is_known: bool
+) -> None:
     stops = Stops(tally(2, 1), 60.0)
     stops.on_stand(Stand(1, 100.0, 150.0, 4.0))
     assert stops.know(Stand(1, *told, 4.0)) == is_known

@@ -60,10 +60,6 @@ class Stop:
         """Whether a stand is a part of the stop."""
         return any(_stand_covers(whole, stand) for whole in (self.stand, *self.later))
 
-    def is_of(self, stand: Stand) -> bool:
-        """Whether a stand is the stop, a part of it, or more of it."""
-        return _is_same_stop(self.stand, stand) or self.covers(stand)
-
     def age(self, epoch: int, rig_now: float) -> float:
         """Seconds from its begin to ``rig_now`` (s) of an epoch, fewer where rig time began anew; infinite after it."""
         newest = (self.stand, *self.later)[-1]
@@ -144,9 +140,10 @@ class Stops:
 
         A source of the depth tells its last stands with every reading, also the parts of a stop that goes on.
         """
-        known = next((stop for stop in reversed(self._stops) if stop.is_of(stand)), None)
+        known = next((s for s in reversed(self._stops) if _is_same_stop(s.stand, stand) or s.covers(stand)), None)
         if known is not None:
-            if not known.covers(stand):
+            own = known.stand
+            if stand.epoch == own.epoch and (stand.begun_at < own.begun_at or own.ended_at < stand.ended_at):
                 known.stand = stand
             self._add_tubes(known)
             return
