@@ -223,8 +223,8 @@ def test_a_wrong_stand_is_not_believed_of_the_time_in_which_nobody_heard_its_rea
     assert [stand.md for stand in bit.log.stands] == [2.0]
 
 
-def test_two_stands_that_contradict_each_other_are_both_doubtful_and_the_present_is_a_jump() -> None:
-    """A ground station that was off while the depth went wrong sees only stands between which no bit can move."""
+def contradicted() -> tuple[Bit, float, float]:
+    """A bit at 0.5 m whose stand at 2 m and the one after it no bit can both have had, and a time of each."""
     bit = Bit()
     bit.move_to(2.0, heard=False)
     right = bit.stand(20.0, heard=False)
@@ -232,6 +232,12 @@ def test_two_stands_that_contradict_each_other_are_both_doubtful_and_the_present
     bit.read(0.5, heard=False)
     wrong = bit.stand(20.0, heard=False)
     bit.hear_stands()
+    return bit, right, wrong
+
+
+def test_two_stands_that_contradict_each_other_are_both_doubtful_and_the_present_is_a_jump() -> None:
+    """A ground station that was off while the depth went wrong sees only stands between which no bit can move."""
+    bit, right, wrong = contradicted()
     assert bit.log.jumped != ""
     assert bit.stand(10.0)
     assert bit.log.at(EPOCH, right) is bit.log.at(EPOCH, wrong) is None
@@ -246,13 +252,7 @@ def test_a_stand_is_believed_again_where_the_depth_returns_to_it_and_the_one_tha
     is_restarted: bool,
 ) -> None:
     """As after a jump that was heard: without that, a stop that was surveyed would be another one after it."""
-    bit = Bit()
-    bit.move_to(2.0, heard=False)
-    right = bit.stand(20.0, heard=False)
-    bit.now += CYCLE
-    bit.read(0.5, heard=False)
-    wrong = bit.stand(20.0, heard=False)
-    bit.hear_stands()
+    bit, right, wrong = contradicted()
     bit.stand(10.0)
     if is_restarted:
         doubt, bit.log = bit.log.doubt, DepthLog(0.5, 5.0)

@@ -6,9 +6,16 @@ import math
 from collections import Counter
 from typing import Any
 
+from sealed_string import state
+
 from telemetry.application.end_to_end import EndToEndDelivery
 from telemetry.application.endpoint import Endpoint
-from telemetry.messages import Side
+from telemetry.messages import Aiding, BlockStatus, Side, UploadPhase
+
+UPPER, LOWER = Side.UPPER, Side.LOWER
+AIDING = Aiding(1.0, 1e-6, 0.0, 0.0, 0.1, 100.0, 1, 0)
+STATE = state(50)
+STATUS = BlockStatus(3, 5, bytes(32), UploadPhase.REFUSED, 0, 2, bytes(32), "too old")
 
 
 class NotedLink:

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from noted_links import noted
+from noted_links import AIDING, LOWER, STATE, STATUS, UPPER, noted
 from sealed_string import state
 from test_endpoint import survey
 
@@ -18,8 +18,6 @@ from telemetry.frozen import replace
 from telemetry.messages import (
     BASE,
     ENCODER,
-    Aiding,
-    BlockStatus,
     Command,
     Hello,
     NodeFlag,
@@ -27,16 +25,9 @@ from telemetry.messages import (
     Side,
     TimeReply,
     TimeRequest,
-    UploadPhase,
 )
 from telemetry.presentation.msgpack_codec import decode_message, encode_message
 from telemetry.schema import MessageKind
-
-UPPER, LOWER = Side.UPPER, Side.LOWER
-AIDING = Aiding(1.0, 1e-6, 0.0, 0.0, 0.1, 100.0, 1, 0)
-STATE = state(50)
-STATUS = BlockStatus(3, 5, bytes(32), UploadPhase.REFUSED, 0, 2, bytes(32), "too old")
-
 
 # states
 

@@ -6,8 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from noted_links import NotedLink, mail
-from sealed_string import state
+from noted_links import LOWER, STATUS, NotedLink, mail
 from test_endpoint import survey
 from test_which_key import Ends, Held, lots
 
@@ -24,27 +23,17 @@ from telemetry.application.end_seal import (
 from telemetry.application.endpoint import Endpoint
 from telemetry.messages import (
     BASE,
-    Aiding,
     BlockSegment,
-    BlockStatus,
     Command,
     Event,
     Receipt,
     Reply,
     SessionOffer,
     Severity,
-    Side,
-    UploadPhase,
 )
 from telemetry.presentation.content import content_of_message
 from telemetry.presentation.msgpack_codec import encode_message, open_payload
 from telemetry.schema import MessageKind
-
-UPPER, LOWER = Side.UPPER, Side.LOWER
-AIDING = Aiding(1.0, 1e-6, 0.0, 0.0, 0.1, 100.0, 1, 0)
-STATE = state(50)
-STATUS = BlockStatus(3, 5, bytes(32), UploadPhase.REFUSED, 0, 2, bytes(32), "too old")
-
 
 # mail
 
