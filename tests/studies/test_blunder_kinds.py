@@ -66,3 +66,11 @@ def test_a_depth_that_stood_still_is_a_doubt_and_a_wrong_collar_is_named() -> No
     assert "depth_contradicts" in stuck.alarms
     collar = run_rig(BlunderJob(draw, places["collar wrong"], 2)).answer
     assert collar.causes == ("collar_wrong",)
+
+
+@pytest.mark.slow
+def test_depths_that_scatter_by_five_centimetres_leave_no_direction_beyond_what_is_stated() -> None:
+    place = next(place for place, kind in enumerate(KINDS) if kind.name == "depth errs at every stop")
+    first, _, third = drawn_rigs(KnownSetUp(), 3)
+    for draw in (first, third):  # those that were beyond it while depths were taken for exact
+        assert run_rig(BlunderJob(draw, place, 1)).direction < 3.0

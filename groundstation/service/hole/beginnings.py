@@ -68,7 +68,8 @@ class Beginnings:
             is_used[looks.station[earlier]] = is_used[0] = True
             places = np.flatnonzero(is_used)
             station = (np.cumsum(is_used) - 1)[looks.station[earlier]]
-            its_path = replace(path, md=path.md[places])
+            # how depths scatter is another thing at every stop, and no matter of where to begin
+            its_path = replace(path, md=path.md[places], leg_length_var=None)
             # a row keeps its readings, and gets another number of its tube where it is revised
             made_of = b"".join(
                 one.tobytes() for one in (numbers[earlier], rows["sequence"][earlier], station, its_path.md)

@@ -78,7 +78,13 @@ class HoleAdjustment:
         self._shared.adjusted_places(OF_TUBE * tubes + make_ups + FURTHER)
 
     def examine(
-        self, stops: ResolvedStops, station_of_row: Places, mds: Array, collar: Direction, number: int
+        self,
+        stops: ResolvedStops,
+        station_of_row: Places,
+        mds: Array,
+        collar: Direction,
+        number: int,
+        scatter: float,
     ) -> ExaminedHole | None:
         """Adjust the hole and say what is wrong with it; None where no look counts.
 
@@ -89,6 +95,7 @@ class HoleAdjustment:
         mds : (s,) m, of the stations below the collar
         collar : direction there, as it is known before
         number : of the newest survey
+        scatter : m^2, of each reading of the depth, beyond what is stated of it
         """
         table = stops.rows[: len(stops)]
         below = np.flatnonzero(station_of_row > 0)
@@ -97,8 +104,10 @@ class HoleAdjustment:
             return None
         # mostly they came in that order, and rows are wide
         path, of_stops = self.path_of(mds, collar), table if are_all(rows, len(table)) else table[rows]
-        forces = stops.mean_forces(rows)
-        seen = self._looked_at(of_stops, forces, station_of_row[rows], path, self._chains)
+        forces, station = stops.mean_forces(rows), station_of_row[rows]
+        if scatter > 0.0:
+            path = replace(path, leg_length_var=scatter * leg_reading_shares(station, stop_numbers(of_stops["at"])))
+        seen = self._looked_at(of_stops, forces, station, path, self._chains)
         seen = replace(seen, start=self._beginnings.start_of(rows, of_stops, seen))
         return seen.examine() if self._search is None else self._search.examine(number, seen)
 
@@ -162,6 +171,24 @@ def number_values(values: npt.NDArray[np.uint32]) -> tuple[list[int], Places]:
 def stop_numbers(at: Array) -> Places:
     """Numbers (n,) of the stops of the string to which times (n,), s, in their order belong."""
     return np.concatenate([[0], np.cumsum(np.diff(at) >= SAME_STOP)]).astype(np.intp)[: len(at)]
+
+
+def leg_reading_shares(station: Places, stop: Places) -> Array:
+    """Variances (s,) of the lengths of legs where each reading of the depth has one of 1.
+
+    A station is where its readings are on the mean, the collar where it is told to be; a reading that two stations
+    share moves both, and their leg not at all.
+
+    Parameters
+    ----------
+    station, stop : (n,) of looks: 1 for the first below the collar, each of which has some; growing from 0
+    """
+    width = int(stop.max()) + 1
+    looks, count = np.bincount(station)[1:], int(station.max())
+    at = station * width + stop
+    shared = np.bincount(station[np.isin(at + width, at)], minlength=count + 1)[1:]
+    own = 1.0 / looks
+    return np.append(own[0], own[:-1] + own[1:] - 2.0 * shared[:-1] * own[:-1] * own[1:])
 
 
 def noise_of(seen: Rows, tube_of: Places) -> Array:

@@ -31,6 +31,7 @@ class HoleDepths:
         self._config, self._setup, self._shared, self._stops = config, setup, shared, stops
         self._told = depth_errors(config, setup)
         self._misfit: tuple[int, float, str] = (0, 0.0, "")  # by version and since when
+        self._learnt = 0, self._told  # by version
         self._columns: dict[float, tuple[tuple[int, ...], Packed]] = {}  # by depth (m) of a station, and of what
 
     def misfit(self, version: int, since: float) -> str:
@@ -45,15 +46,18 @@ class HoleDepths:
             self._misfit = version, since, misfit_of_depths(found, self._told, self._config.tube_length)
         return self._misfit[2]
 
-    def of_stations(self, stations: Sequence[SurveyStation], *, learns: bool) -> dict[float, StationDepth]:
+    def of_stations(
+        self, stations: Sequence[SurveyStation], version: int, *, learns: bool
+    ) -> dict[float, StationDepth]:
         """Errors of the depths of stations, by these (m).
 
         Parameters
         ----------
+        version : of the hole
         learns : how depths scatter at make-ups is taken in; that is another thing at every stop, so where all stations
             are worked out anew
         """
-        errors = self._learnt() if learns else self._told
+        errors = self.learnt(version) if learns else self._told
         stds = length_stds(self._setup) if self._setup.lengths else {}
         told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()} if stds else {}
         found, places_of = {}, self._stops.depth_places.__getitem__
@@ -67,7 +71,17 @@ class HoleDepths:
             found[one.md] = StationDepth(known[1], errors.reading_std**2 / made_of[0])
         return found
 
-    def _learnt(self) -> DepthErrors:
-        """Errors of measured depths, as far as they scatter at make-ups."""
-        found = depths_at_make_ups(self._stops, self._shared, self._config, self._setup)
-        return replace(self._told, reading_std=learnt_reading_std(found, self._told, self._config.tube_length))
+    def scatter(self, version: int) -> float:
+        """Variance (m^2) of each reading of the depth that the make-ups show beyond what is stated of it.
+
+        What is stated, some millimetres, bends no hole by anything.
+        """
+        return self.learnt(version).reading_std ** 2 - self._told.reading_std**2
+
+    def learnt(self, version: int) -> DepthErrors:
+        """Errors of measured depths, as far as they scatter at make-ups; worked out once for each version."""
+        if self._learnt[0] != version:
+            found = depths_at_make_ups(self._stops, self._shared, self._config, self._setup)
+            std = learnt_reading_std(found, self._told, self._config.tube_length)
+            self._learnt = version, replace(self._told, reading_std=std)
+        return self._learnt[1]

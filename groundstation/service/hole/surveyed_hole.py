@@ -236,7 +236,8 @@ class SurveyedHole:
         """
         if self._examined[0] != self.version:
             try:
-                found = self._adjustment.examine(self._stops, *self._stations.numbered(), self._collar, self.newest)
+                stations, scatter = self._stations.numbered(), self._depths.scatter(self.version)
+                found = self._adjustment.examine(self._stops, *stations, self._collar, self.newest, scatter)
                 self._is_unsolved = False
             except (np.linalg.LinAlgError, ArithmeticError):
                 found, self._is_unsolved = None, True
@@ -330,7 +331,7 @@ class SurveyedHole:
         return self._depths.misfit(self.version, since)
 
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
-        depths = self._depths.of_stations(changed, learns=self._is_adjusted)
+        depths = self._depths.of_stations(changed, self.version, learns=self._is_adjusted)
         self._trajectory.put(self._directions(changed), depths)
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)

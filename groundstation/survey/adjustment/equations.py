@@ -72,15 +72,21 @@ def known_collar(path: PathPrior, bases: Array) -> Array:
 
 
 def leg_steps(path: PathPrior) -> tuple[Array, Array]:
-    """How the state of a station goes on to the next (s, 4, 4), and the information (s, 4, 4) of a curvature of 1."""
-    return _steps_of(path.md.tobytes(), path.correlation_length)
+    """How the state of a station goes on to the next (s, 4, 4), and the information (s, 4, 4) of a curvature of 1.
+
+    Over what a leg is longer than told the hole goes on bending: that is one more noise of its direction.
+    """
+    off = b"" if path.leg_length_var is None else path.leg_length_var.tobytes()
+    return _steps_of(path.md.tobytes(), path.correlation_length, off)
 
 
 @lru_cache(maxsize=4)  # one adjustment asks for its own again and again
-def _steps_of(md: bytes, correlation_length: float) -> tuple[Array, Array]:
+def _steps_of(md: bytes, correlation_length: float, leg_length_var: bytes) -> tuple[Array, Array]:
     steps = [process_step(length, correlation_length) for length in np.diff(np.frombuffer(md)).tolist()]
     go = np.array([step[0][1:, 1:] for step in steps]).reshape(-1, 2, 2)
     noise = np.array([step[1][1:, 1:] for step in steps]).reshape(-1, 2, 2)
+    if leg_length_var:
+        noise[:, 0, 0] += np.frombuffer(leg_length_var)
     return _for_both_axes(go), _for_both_axes(np.asarray(np.linalg.inv(noise), np.float64))
 
 

@@ -92,6 +92,7 @@ class PathPrior:
     collar : (3,) unit vector down the hole at the collar
     collar_cov : (3, 3) rad^2, of it; none along it
     curvature_std, correlation_length : rad/m and m, of the curvature that wanders; the former until the looks tell it
+    leg_length_var : (s,) m^2, of the length of each leg; None where lengths are exact
     """
 
     md: Array
@@ -99,6 +100,7 @@ class PathPrior:
     collar_cov: Array
     curvature_std: float
     correlation_length: float
+    leg_length_var: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)
