@@ -35,6 +35,7 @@ CACHE_KB = 256  # of pages that a connection keeps: rows come at the end, and th
 SHOWN = 5  # tables named of a database that is not ours
 HEAD = struct.Struct(">16s H 10x I")  # of a file of SQLite: its name, bytes of a page (1 for 65536), pages
 SQLITE = b"SQLite format 3\0"
+FILE_DRIVERS: Final = ("sqlite", "sqlite+pysqlite")  # of a file that is opened by ``Disk``
 COMPILED: Final[dict[Any, Any]] = {}  # statements for SQLite by their keys; as many as the sources have
 
 
@@ -247,7 +248,7 @@ def _engine_of(url: str, disk: Disk) -> sa.Engine:
     """Engine of a URL, a file by ``disk``; a refusal does not repeat the URL, which may hold a password."""
     try:
         address = sa.make_url(url)
-        if address.get_backend_name() == "sqlite" and address.database and not address.query:
+        if address.drivername in FILE_DRIVERS and address.database and not address.query:
             return _engine_of_file(address, disk)
         if address.drivername == "postgresql":
             address = address.set(drivername="postgresql+psycopg")
