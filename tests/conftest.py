@@ -44,6 +44,7 @@ TESTS = Path(__file__).parent
 WAITING = ("process", "install")  # markers of tests that wait for processes more than they compute
 WAITS_S = {  # roughly how long a file waits, of those that wait for more than the usual time or are not marked
     "processes/test_rig.py": 225,
+    "processes/test_two_releases.py": 110,
     "processes/test_trust.py": 90,
     "processes/test_own_clock.py": 80,
     "processes/test_field_calibration.py": 70,

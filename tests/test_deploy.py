@@ -11,8 +11,11 @@ from pathlib import Path
 
 import click
 import pytest
+import yaml
 
 from borechain.__main__ import cli
+from groundstation.errors import StoreError
+from telemetry.runtime.command_line import fault_of
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "deploy.md").read_text()
@@ -28,12 +31,16 @@ def config_of(name: str) -> str:
     return re.sub(r"^    ", "", block[1], flags=re.MULTILINE)
 
 
-def started(unit: Path) -> list[str]:
-    """Words of the command that a unit starts."""
+def read_unit(unit: Path) -> configparser.ConfigParser:
     parser = configparser.ConfigParser(interpolation=None, strict=False)
     parser.optionxform = str  # type: ignore[assignment, method-assign]
     parser.read_string(unit.read_text())
-    return shlex.split(parser["Service"]["ExecStart"].replace("%i", "7"))
+    return parser
+
+
+def started(unit: Path) -> list[str]:
+    """Words of the command that a unit starts."""
+    return shlex.split(read_unit(unit)["Service"]["ExecStart"].replace("%i", "7"))
 
 
 @pytest.mark.parametrize("unit", [unit for unit in UNITS if "-can" not in unit.name], ids=lambda unit: unit.stem)
@@ -57,6 +64,25 @@ def test_every_unit_is_named_on_the_page_and_runs_as_no_root() -> None:
         assert unit.stem.rstrip("@") in PAGE
         if "-can" not in unit.name:
             assert "\nUser=borechain\n" in unit.read_text()
+
+
+@pytest.mark.parametrize("unit", [unit for unit in UNITS if "-can" not in unit.name], ids=lambda unit: unit.stem)
+def test_a_process_that_ends_is_started_again_however_often_it_does(unit: Path) -> None:
+    """A ground station ends by itself for a backup in its database's place; usually systemd gives up at the fifth."""
+    read = read_unit(unit)
+    assert read["Service"]["Restart"] == "always"
+    assert not {"RestartPreventExitStatus", "SuccessExitStatus"} & set(read["Service"])
+    assert read["Unit"]["StartLimitIntervalSec"] == "0"
+
+
+def test_a_container_that_fails_is_started_again_and_a_ground_station_that_ends_for_a_backup_fails() -> None:
+    services = yaml.safe_load((ROOT / "docker-compose.yml").read_text())["services"]
+    restarts = {name: service.get("restart") for name, service in services.items()}
+    assert restarts.pop("keys") is None  # which is done once
+    assert set(restarts.values()) == {"on-failure"}  # without a number of tries
+    fault = fault_of(StoreError("database ground.sqlite: another one lies in its place"))
+    assert fault is not None
+    assert fault.exit_code not in (0, None)
 
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze here")

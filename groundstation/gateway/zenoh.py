@@ -59,7 +59,7 @@ class ZenohGateway:
         self._publishers: dict[str, Publisher] = {}
         self._late: dict[str, None] = {}  # paths of the hole that are to be put
         self._intake = bus.publisher(keys.INTAKE.format(rig=self._rig), MSGPACK, droppable=True)
-        self._taped = 0  # newest event of the intake that was published, 0 without a listener
+        self._taped: int | None = None  # newest event of the intake that was published, None without a listener
         self._told = {
             one.path: process.model.newest_row(one.path) for one in ANSWERS.values() if one.is_stream
         }  # newest row of each stream that was published, or there before
@@ -137,12 +137,13 @@ class ZenohGateway:
         """Put what was taken in since the last time; a new listener gets all that is kept first."""
         tape, process = self._process.tape, self._process
         if not self._intake.is_heard:
-            self._taped = 0
+            self._taped = None
             return
-        if self._taped == 0:
+        if self._taped is None:
             settings = process.config.model_dump(mode="json", exclude=set(PRIVATE))
             begin = Intake(0, BEGIN, 0.0, 0.0, 0, {"settings": settings, "start": process.start_number})
             self._intake.put(pack_intake(begin))
+            self._taped = 0
         for event in tape.after(self._taped):
             self._intake.put(pack_intake(event))
         self._taped = tape.newest

@@ -118,6 +118,10 @@ class FaultyDisk:
         """Number of the file that has this name; 0 where there is none."""
         return self.files[path.name].number if path.name in self.files else 0
 
+    def stamp(self, path: Path) -> tuple[int, ...]:
+        """Its number alone: no file of this disk is written over from outside."""
+        return (self.files[path.name].number,) if path.name in self.files else ()
+
     def connect(self, path: Path) -> sqlite3.Connection:
         """Open a database; one at a time, as each has its own image of the file."""
         if self._open is not None:

@@ -45,6 +45,9 @@ class Disk(Protocol):
     def identity(self, path: Path) -> int:
         """Number of the file that has this name now; 0 where there is none."""
 
+    def stamp(self, path: Path) -> tuple[int, ...]:
+        """Identity of a file, and what a write to it changes where the disk says so; empty where there is none."""
+
     def connect(self, path: Path) -> sqlite3.Connection:
         """Open a database; sqlite3.Error where it refuses."""
 
@@ -116,6 +119,14 @@ class MachineDisk:
             return path.stat().st_ino
         except OSError:
             return 0
+
+    def stamp(self, path: Path) -> tuple[int, ...]:
+        """Inode, bytes and time of the last write (ns)."""
+        try:
+            found = path.stat()
+        except OSError:
+            return ()
+        return found.st_ino, found.st_size, found.st_mtime_ns
 
     def connect(self, path: Path) -> sqlite3.Connection:
         """Open a database file; a connection may go from thread to thread, as a pool does with it."""

@@ -168,6 +168,18 @@ def test_a_listener_is_given_all_that_was_taken_in_once_and_the_next_one_again(d
         assert door.bus.taken() == []
 
 
+def test_an_intake_begins_once_where_nothing_was_taken_in_yet(door: Door) -> None:
+    assert door.rig.ground.tape.newest == 0
+    door.bus.taken()
+    door.gateway._publish([])
+    assert door.bus.taken() == ["intake"]
+    door.gateway._publish([])
+    assert door.bus.taken() == []
+    door.rig.read_depth(1.0)
+    door.gateway._publish([])
+    assert door.bus.taken().count("intake") == len(list(door.rig.ground.tape.after(0))) == 1
+
+
 def test_a_recorder_asks_for_what_it_lacks(door: Door) -> None:
     for md in (1.0, 1.2, 1.4):
         door.rig.read_depth(md)

@@ -169,11 +169,22 @@ def test_a_database_that_refused_is_opened_anew(tmp_path: Path) -> None:
             assert store.refusal == ""
 
 
-@pytest.mark.parametrize("address", ["nonsense", "mysql://u:secret@h/d"])
-def test_a_database_that_cannot_be_named_is_refused_without_its_password(address: str) -> None:
+@pytest.mark.parametrize("address", ["nonsense", "mysql://u:secret@h/d", "sqlite+nothing:///FILE", "sqlite+nothing://"])
+def test_a_database_that_cannot_be_named_is_refused_without_its_password(address: str, tmp_path: Path) -> None:
+    address = address.replace("FILE", str(tmp_path / "ground.sqlite"))
     with pytest.raises(StoreError, match="database URL: expected one such as sqlite:///FILE whose driver") as refused:
         Store(address)
     assert "secret" not in str(refused.value)
+    assert "\n" not in str(refused.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("driver", ["sqlite", "sqlite+pysqlite"])
+def test_a_file_is_kept_durably_by_either_name_of_its_driver(driver: str, tmp_path: Path) -> None:
+    with contextlib.closing(Store(f"{driver}:///{tmp_path / 'ground.sqlite'}")) as store:
+        assert store.add_message(survey(1, 1), None)
+        with store._engine.connect() as connection:
+            assert connection.exec_driver_sql("PRAGMA journal_mode").scalar() == "wal"
 
 
 # databases that parted

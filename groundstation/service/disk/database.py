@@ -1,8 +1,9 @@
 """The database of a ground station, a file or a server: opened, checked, written to durably, named where it refuses.
 
 A disk that refuses leaves what is there readable: a database that cannot be written is opened all the same, and a file
-that was deleted under the running program is noticed before the next commit, which would be lost with it. Where a whole
-database lies in its place, a backup that was restored, a ground station that starts anew goes on with that one.
+that was deleted or written over under the running program is noticed before the next commit, which would be lost with
+it. Where a whole database lies in its place, a backup that was restored, a ground station that starts anew goes on with
+that one. A journal is never read into a file that it was not begun on (``guarded_file``).
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import contextlib
 import functools
 import sqlite3
 import struct
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,15 +20,15 @@ import sqlalchemy as sa
 
 from groundstation.errors import StoreError
 from groundstation.service.disk.database_tables import (
-    ADD_META,
     ALL_META,
     DIGESTED,
-    DROP_META,
     META,
     METADATA,
     READABLE,
     SCHEMA,
+    replace_meta,
 )
+from groundstation.service.disk.guarded_file import GuardedFile
 from groundstation.service.disk.row_digest import DIGEST
 from telemetry.runtime.disk import MACHINE, Disk
 
@@ -35,6 +36,7 @@ CACHE_KB = 256  # of pages that a connection keeps: rows come at the end, and th
 SHOWN = 5  # tables named of a database that is not ours
 HEAD = struct.Struct(">16s H 10x I")  # of a file of SQLite: its name, bytes of a page (1 for 65536), pages
 SQLITE = b"SQLite format 3\0"
+FILE_DRIVERS: Final = ("sqlite", "sqlite+pysqlite")  # of a file that is opened by ``Disk``
 COMPILED: Final[dict[Any, Any]] = {}  # statements for SQLite by their keys; as many as the sources have
 
 
@@ -65,17 +67,20 @@ class Database:
         self._file = Path(address.database) if self._engine.dialect.name == "sqlite" and address.database else None
         self.refusal = ""
         self.boots = 0
+        self._guarded = None if self._file is None else GuardedFile(self._file, disk)
         self._tables: set[str] = set()
         self._undigested: set[str] = set()  # tables of before without hashes, in a database that cannot be written
         try:
             with self._refusing("; choose a writable --folder or another database"):
-                if self._file is not None:
-                    disk.make_folder(self._file.parent)
+                if self._guarded is not None:
+                    disk.make_folder(self._guarded.file.parent)
+                    self._guarded.part_foreign_journal()
                 self._begin(self._check_schema(self._engine))
         except StoreError:
             self.close()
             raise
-        self._inode, self._journal = self._found_inode(), self._found_journal()
+        if self._guarded is not None:
+            self._guarded.note_stamps()
 
     def _has(self, table: sa.Table) -> bool:
         """Whether there is a table; a database of before that cannot be written lacks the later ones."""
@@ -89,15 +94,24 @@ class Database:
         return statement.with_only_columns(*(column for column in columns if column.name != DIGEST))
 
     def close(self) -> None:
-        """Close every connection."""
+        """Close every connection; the last one puts the journal into the file."""
+        if self._guarded is not None:
+            self._guarded.close()
         self._engine.dispose()
+        if self._guarded is not None:
+            self._guarded.release()
+
+    @property
+    def parted(self) -> str:
+        """What lay beside the file at the start and was another's; empty where nothing was."""
+        return "" if self._guarded is None else self._guarded.parted
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[sa.Connection]:
         """A transaction, committed to a file that still has its name."""
         try:
             with self._refusing():
-                if self._found_inode() != self._inode:
+                if self._guarded is not None and not self._guarded.is_as_left(self._engine):
                     raise StoreError(f"database {self._where}: was removed or replaced while the ground station ran")
                 with self._engine.begin() as connection:
                     yield connection
@@ -106,7 +120,9 @@ class Database:
             self._engine.dispose()  # a file that was opened while it could not be written stays so
             raise
         self.refusal = ""
-        self._journal = self._found_journal()
+        if self._guarded is not None:
+            with self._refusing():
+                self._guarded.follow_journal(self._engine)
 
     def check_place(self) -> None:
         """See that no other database lies in the place of one that takes nothing any more.
@@ -116,7 +132,7 @@ class Database:
         StoreError
             When a whole one of a ground station does: the process has to start anew, to go on with what is there.
         """
-        if self.refusal and self._found_inode() not in (0, self._inode) and self._is_another_whole():
+        if self.refusal and self._guarded is not None and self._guarded.is_another and self._is_another_whole():
             raise StoreError(
                 f"database {self._where}: another one lies in its place; start the ground station again on it"
             )
@@ -126,7 +142,7 @@ class Database:
 
         One that is shorter than its head says is not opened: nothing of ours is to be written into it.
         """
-        if self._file is None:
+        if self._guarded is None or self._file is None:
             return False
         self._engine.dispose()
         looking = _engine_of_file(self._engine.url, self._disk)  # ours would make it durable, which is a change
@@ -135,25 +151,12 @@ class Database:
             last = (page if page > 1 else 65536) * pages - 1
             if name != SQLITE or last < 0 or not self._disk.read(self._file, last, 1):
                 return False
-            self._part_from_journal()
+            self._guarded.part_own_journal()
             return bool(self._check_schema(looking))
         except (struct.error, OSError, sa.exc.SQLAlchemyError):  # a refusal of its schema is an OSError too
             return False
         finally:
             looking.dispose()
-
-    def _part_from_journal(self) -> None:
-        """Give our journal another name: SQLite would read it into whatever file has the name of ours."""
-        if self._file is not None and self._journal and self._found_journal() == self._journal:
-            self._disk.rename(_journal_of(self._file), self._file.with_name(f"{self._file.name}-parted-{self._inode}"))
-
-    def _found_journal(self) -> int:
-        """Identity of the journal beside the file; 0 where there is none."""
-        return self._disk.identity(_journal_of(self._file)) if self._file is not None else 0
-
-    def _found_inode(self) -> int:
-        """Identity of the file that has the database's name; 0 where there is none, or no file."""
-        return self._disk.identity(self._file) if self._file is not None else 0
 
     @contextlib.contextmanager
     def _refusing(self, remedy: str = "") -> Iterator[None]:
@@ -186,12 +189,6 @@ class Database:
     def _meta(self) -> dict[str, str]:
         return _meta_of(self._engine)
 
-    @staticmethod
-    def _replace_meta(connection: sa.Connection, values: Mapping[str, str], without: Iterable[str] = ()) -> None:
-        """Store values by their names, in the place of those stored before, of which those ``without`` go."""
-        connection.execute(DROP_META, [{"its_name": name} for name in (*values, *without)])
-        connection.execute(ADD_META, [{"name": name, "value": value} for name, value in values.items()])
-
     def _begin(self, tables: list[str]) -> None:
         """Make ready for writing and count this start; a database of ours that refuses is read all the same."""
         if self._engine.dialect.name == "sqlite":
@@ -206,6 +203,8 @@ class Database:
                 self._tables.update(METADATA.tables)
                 self._add_digests()
                 self._count_start()
+                if self._guarded is not None:
+                    self._guarded.begin(self._engine)
         except StoreError as error:
             if not tables:
                 raise
@@ -231,7 +230,7 @@ class Database:
         boots = int(self._meta().get("boots", "0")) + 1
         self.boots = boots
         with self._engine.begin() as connection:
-            self._replace_meta(connection, {"schema": str(SCHEMA), "boots": str(boots)})
+            replace_meta(connection, {"schema": str(SCHEMA), "boots": str(boots)})
 
 
 def _meta_of(engine: sa.Engine) -> dict[str, str]:
@@ -239,15 +238,11 @@ def _meta_of(engine: sa.Engine) -> dict[str, str]:
         return {row.name: row.value for row in connection.execute(ALL_META)}
 
 
-def _journal_of(file: Path) -> Path:
-    return file.with_name(f"{file.name}-wal")
-
-
 def _engine_of(url: str, disk: Disk) -> sa.Engine:
     """Engine of a URL, a file by ``disk``; a refusal does not repeat the URL, which may hold a password."""
     try:
         address = sa.make_url(url)
-        if address.get_backend_name() == "sqlite" and address.database and not address.query:
+        if address.drivername in FILE_DRIVERS and address.database and not address.query:
             return _engine_of_file(address, disk)
         if address.drivername == "postgresql":
             address = address.set(drivername="postgresql+psycopg")
@@ -287,5 +282,6 @@ def _make_durable(connection: sa.engine.interfaces.DBAPIConnection, _record: obj
         cursor.execute("PRAGMA journal_mode=WAL")
     cursor.execute("PRAGMA synchronous=FULL")
     cursor.execute("PRAGMA busy_timeout=5000")
+    cursor.execute("PRAGMA wal_autocheckpoint=0")  # ``GuardedFile`` does so, with a generation
     cursor.execute(f"PRAGMA cache_size=-{CACHE_KB}")
     cursor.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterable, Mapping
 
 import sqlalchemy as sa
 from sqlalchemy.dialects import sqlite
@@ -132,3 +133,9 @@ def add_new(dialect: str) -> sa.Insert:
 
         return postgresql.insert(MESSAGES).on_conflict_do_nothing()
     return sqlite.insert(MESSAGES).on_conflict_do_nothing()
+
+
+def replace_meta(connection: sa.Connection, values: Mapping[str, str], without: Iterable[str] = ()) -> None:
+    """Store values by their names, in the place of those stored before, of which those ``without`` go."""
+    connection.execute(DROP_META, [{"its_name": name} for name in (*values, *without)])
+    connection.execute(ADD_META, [{"name": name, "value": value} for name, value in values.items()])

@@ -50,6 +50,7 @@ from groundstation.service.disk.database_tables import (
     STRING,
     WHOLE_STRING,
     add_new,
+    replace_meta,
 )
 from groundstation.service.disk.moment_record import DamagedMomentError, moment_of_bytes, moment_to_bytes
 from groundstation.service.disk.row_digest import add_digest, as_read, is_sound
@@ -146,7 +147,7 @@ class Store(Database):
     def keep_epoch(self, epoch: int) -> None:
         """Store the epoch of rig time."""
         with self._writing() as connection:
-            self._replace_meta(connection, {"epoch": str(epoch)})
+            replace_meta(connection, {"epoch": str(epoch)})
 
     def keep_depth_doubt(self, doubt: DepthDoubt) -> None:
         """Store since when depths are refused, when the crew accepted one, and of which times none is believed."""
@@ -156,7 +157,7 @@ class Store(Database):
         if doubt.times:
             values["depth_doubted"] = "; ".join(map(_stand_text, doubt.times))
         with self._writing() as connection:
-            self._replace_meta(connection, values, without=["depth_trusted", "depth_doubted"])
+            replace_meta(connection, values, without=["depth_trusted", "depth_doubted"])
 
     def depth_doubt(self) -> DepthDoubt:
         """What was kept last of what is doubtful of the depth."""

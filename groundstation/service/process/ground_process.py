@@ -279,6 +279,7 @@ class GroundProcess(Process):
         self._time.look()
         alarms.hold("disk", "database", refusal)
         alarms.hold("database", "database", f"{self.store.damaged} rows" if self.store.damaged else "")
+        alarms.hold("database", "journal", self.store.parted)
         dropped = self.endpoint.dropped
         alarms.hold("queue", "ground station", f"{dropped} dropped" if dropped else "")
         self._seal_watch.look(now)
