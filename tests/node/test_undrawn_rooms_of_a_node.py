@@ -79,6 +79,11 @@ def test_a_string_that_moves_from_cycle_to_cycle_is_not_at_rest(axis: int, sign:
         else:
             witness.look(tuple(rate), tuple(force))
     witness = GravityWitness()
+    witness.look((0.0, 0.0, 0.0), (3.0, 2.0, 1.0))
+    witness.look((0.0, 0.0, 0.0), (5.0, 2.0, 1.0))
+    with pytest.raises(SensorError):  # it has come to rest since
+        witness.look((0.0, 0.0, 0.0), (5.0, 2.0, 1.0))
+    witness = GravityWitness()
     for _ in range(3):
         witness.look((NAN, 0.0, 0.0), (1.0, 0.0, 0.0))
 

@@ -96,6 +96,12 @@ def test_a_stand_is_two_alike_and_goes_on_while_they_stay_alike() -> None:
     assert source.measure(2.1, 2.0, 5).stands == (Stand(5, 1.9, 2.1, 2.0),)
 
 
+def test_a_bit_that_was_away_for_one_reading_stands_anew() -> None:
+    source = DepthSource()
+    told = [source.measure(at, md, 4) for at, md in ((1.0, 2.0), (2.0, 2.0), (3.0, 2.5), (4.0, 2.0), (5.0, 2.0))]
+    assert told[-1].stands == (Stand(4, 1.0, 2.0, 2.0), Stand(4, 4.0, 5.0, 2.0))
+
+
 def test_the_newest_stands_are_sent() -> None:
     source, sent = DepthSource(), None
     for k in range(MAX_STANDS + 2):
