@@ -142,6 +142,16 @@ def test_an_operator_writes_degrees_and_seconds_and_the_tube_gets_si(rig: Rig) -
     assert order.arguments == {"seconds": 60.0}
 
 
+def test_a_tube_that_is_heard_and_hangs_nowhere_may_be_asked_after_those_that_hang(rig: Rig) -> None:
+    """A tube that was taken out of the string still answers on the bench."""
+    string = rig.ground.model.string
+    string.tally.remove(2)
+    assert string.tubes == [1]
+    assert rig.ground.operator.command(2, "take_survey").tube == 2
+    with pytest.raises(SelectorError, match=r"^tube 3: not in the string; expected one of 1, 2$"):
+        rig.ground.operator.command(3, "take_survey")
+
+
 def test_a_ground_station_that_knows_no_tube_says_so(tmp_path: Path) -> None:
     ground = GroundProcess(GroundConfig(folder=tmp_path))
     with pytest.raises(SelectorError, match="tube 1: not in the string; no tube has reported yet"):

@@ -144,6 +144,26 @@ def test_a_segment_is_believed_under_any_of_the_keys_that_are_valid(rested: Call
         assert (status.phase is not UploadPhase.UNTRUSTED) == is_believed
 
 
+def test_segments_that_are_not_believed_are_told_once_a_minute_with_how_many_came(
+    rested: Callable[[], Node],
+) -> None:
+    node, said = rested(), []
+    store = BlockStore(FOLDER, node.disk)
+    updater = BlockUpdater(node.process.tube, store, lambda: [KEY], lambda *words: said.append(words), lambda: None)
+    wrong = segments(5, 4, key=OTHER)[0]
+    for now, count in ((1000.0, 1), (1000.0, None), (1059.999, None), (1060.0, 4), (1061.0, None)):
+        said.clear()
+        status = updater.on_segment(wrong, now)
+        assert (status.phase, status.received, status.sequence) == (UploadPhase.UNTRUSTED, 0, 4)
+        reason = "segment 0: the tag is not of the node's key"
+        arguments = {"version": 5, "reason": reason, "segments": count}
+        assert said == ([] if count is None else [(Severity.WARNING, "upload_untrusted", arguments)])
+    bare = BlockUpdater(node.process.tube, store, list, lambda *words: said.append(words), lambda: None)
+    said.clear()
+    bare.on_segment(segments(5, 1)[0], 0.0)
+    assert said[0][2] == {"version": 5, "reason": "the node has no key of the rig", "segments": 1}
+
+
 @pytest.mark.parametrize("beyond", [0, 1])
 def test_a_segment_has_a_number_below_that_of_all(rested: Callable[[], Node], beyond: int) -> None:
     part = segments(5, 1)[-1]

@@ -21,6 +21,11 @@ CALIBRATIONS, PAPERS, STATIONS, WALLS = (
     for name in ("calibration/test_calibrations", "test_papers", "test_stations", "test_walls")
 )
 DAMAGED, SURVEYS = (f"groundstation/survey/test_{name}_whole.py" for name in ("damaged_files", "surveys"))
+UNDRAWN_GROUND, UNDRAWN_LINK, UNDRAWN_NODE = (
+    "groundstation/test_undrawn_rooms_by_hand.py", "telemetry/test_undrawn_rooms_of_the_link.py",
+    "node/test_undrawn_rooms_of_a_node.py",
+)  # fmt: skip
+OF_NODES = tuple(f"node/test_{name}.py" for name in ("options_by_hand", "told_by_hand", "board_by_hand"))
 GATEWAY, LEASED, KEPT, CALIBRATED, STRING, *SETUP = (
     f"groundstation/test_{name}_by_hand.py"
     for name in ("gateway", "leased", "kept", "recalibration", "string", "setup", "setup_told", "setup_costs")
@@ -37,16 +42,17 @@ WHOLE = {  # tests that look at a whole room: without importing it, or from a fo
     "node/__main__": SMALL,
     "node/firmware/": ("node/test_seeded_nodes.py",),
     "node/kernels/": ("node/test_seeded_nodes.py",),
-    "node/process/": ("test_seeded_rigs.py",),
+    "node/process/": (UNDRAWN_NODE, *OF_NODES, "test_seeded_rigs.py"),
     "node/translation/c_": ("node/chip/test_translated_forms.py",),
     "telemetry/application/end": ("telemetry/test_endpoint_by_hand.py", "telemetry/test_mail_by_hand.py"),
-    "telemetry/application/": ("test_seeded_rigs.py",),
+    "telemetry/application/": (UNDRAWN_LINK, "test_seeded_rigs.py"),
     "telemetry/media/can_": ("telemetry/test_whole_wire.py",),
+    "telemetry/media/memory": (UNDRAWN_LINK,),
     "telemetry/media/isotp.py": ("telemetry/test_whole_wire.py",),
     "telemetry/media/send_queue.py": ("telemetry/test_whole_wire.py",),
     "telemetry/presentation/": ("telemetry/test_whole_wire.py", "test_seeded_rigs.py"),
     "telemetry/radio/": ("telemetry/test_whole_wire.py",),
-    "telemetry/runtime/": ("test_seeded_rigs.py",),
+    "telemetry/runtime/": (UNDRAWN_LINK, "test_seeded_rigs.py"),
     "telemetry/transport/": ("test_seeded_rigs.py",),
     "groundstation/calibration/": (CALIBRATIONS, DAMAGED),
     "groundstation/entry/": (DAMAGED,),
@@ -63,16 +69,19 @@ WHOLE = {  # tests that look at a whole room: without importing it, or from a fo
     "groundstation/service/disk/": (KEPT,),
     "groundstation/service/orders/recalibration/": (CALIBRATED,),
     "groundstation/service/setup/": tuple(SETUP),
-    "groundstation/service/string/": (STRING,),
+    "groundstation/service/hole/collar": (UNDRAWN_GROUND,),
+    "groundstation/service/process/": (UNDRAWN_GROUND,),
+    "groundstation/service/string/": (STRING, "groundstation/test_depth_by_hand.py", UNDRAWN_GROUND),
     "groundstation/service/": (STATIONS,),
     "groundstation/survey/adjustment/": (STATIONS,),
     "groundstation/survey/exports/": (SURVEYS, WALLS),
+    "groundstation/survey/files/dip": (UNDRAWN_GROUND,),
     "groundstation/survey/files/": (DAMAGED, SURVEYS),
     "groundstation/survey/fusion/": (STATIONS,),
     "groundstation/survey/path/": (STATIONS, SURVEYS),
     "groundstation/survey/requests/": (SURVEYS, WALLS),
     "groundstation/survey/tools/": (SURVEYS, PAPERS),
-    "groundstation/survey/wall/": (WALLS, DAMAGED),
+    "groundstation/survey/wall/": (WALLS, DAMAGED, UNDRAWN_GROUND),
     "groundstation/survey/well/": (SURVEYS, STATIONS),
     "sim/campaign/": SEEDED,
     "sim/gauntlet/": ("gauntlet/test_faults_as_they_were.py", *SMALL),
