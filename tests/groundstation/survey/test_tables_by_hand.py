@@ -206,12 +206,12 @@ def test_a_depth_that_was_read_more_often_is_better_known_and_what_was_told_anew
     config: Any = SimpleNamespace(tube_length=2.0)
     depths = HoleDepths(config, setup, None, stops)
     station: Any = SimpleNamespace(md=4.0, revised=0, stops=SimpleNamespace(rows=[0, 1, 2, 3]))
-    found = [depths.of_stations([station], learns=False)[4.0] for _ in range(2)]
+    found = [depths.of_stations([station], 1, learns=False)[4.0] for _ in range(2)]
     assert [dataclasses.astuple(one) for one in found] == [(1, pytest.approx(0.06**2 / 4.0))] * 2
     setup.version = 2
-    depths.of_stations([station], learns=False)
+    depths.of_stations([station], 1, learns=False)
     station.revised = 1
-    depths.of_stations([station], learns=False)
+    depths.of_stations([station], 1, learns=False)
     station.stops.rows.append(4)
-    depths.of_stations([station], learns=False)
+    depths.of_stations([station], 1, learns=False)
     assert asked == [4.0] * 4
