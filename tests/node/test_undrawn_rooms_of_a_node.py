@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from emulated_vn100 import Line
 
 from node.errors import SensorCause, SensorError
 from node.firmware.imu_settings import ImuSettings
@@ -19,9 +21,11 @@ from node.kernels.turns.rest_watch import CYCLES
 from node.process.bias_search import LARGEST_DEG, BiasSearch, missing_of
 from node.process.board_findings import bad_finding, good_finding
 from node.process.board_watch import worst_of
+from node.process.drivers import vn100
 from node.process.drivers.fifo_window import parts_of, window_std
 from node.process.drivers.gravity_witness import GravityWitness
 from node.process.drivers.timed import TimedEncoder
+from node.process.drivers.vn100 import Vn100
 from node.process.temperature_range import bias_at, unmeasured_bias
 from node.process.temperature_watch import TemperatureWatch, follows_temperature
 from telemetry.messages import Severity
@@ -209,6 +213,21 @@ def test_of_two_imus_the_one_that_lost_its_temperature_is_named() -> None:
     assert (code, arguments["imu"], arguments["readings_used"]) == ("temperature_lost", 2, False)
     watch.look(reading(25.0, reading(40.0)))
     assert said.take() == [(Severity.WARNING, "temperature_back", {"imu": 2})]
+
+
+def test_a_serial_line_that_refuses_to_be_read_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    line = Line()
+    source = Vn100(line.path)
+    source.start()
+
+    def refused(*_: Any) -> bytes:
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(vn100, "read_waiting", refused)
+    with pytest.raises(SensorError, match=rf"^vn100: {line.path}: Input/output error: the line is gone$"):
+        source.read(100.0, 100.5)
+    source.close()
+    line.cut()
 
 
 # windows, rows and findings

@@ -36,7 +36,7 @@ SMALL = ("test_small_doors_by_hand.py",)
 WHOLE = {  # tests that look at a whole room: without importing it, or from a folder of which none is chosen
     "benchmarks/": ("test_benches_by_hand.py", "test_benches_of_rigs_by_hand.py", *SMALL),
     "borechain/cli/rig/": SMALL,
-    "borechain/cli/": ("test_options_whole.py",),
+    "borechain/cli/": ("test_options_whole.py", "test_command_edges_by_hand.py"),
     "borechain/gauntlet/": ("gauntlet/test_oracles_by_hand.py", "gauntlet/test_wellness_by_hand.py", *SMALL),
     "borechain/studies/": ("studies/test_studies_whole.py", "studies/test_set_up_study_whole.py"),
     "node/__main__": SMALL,

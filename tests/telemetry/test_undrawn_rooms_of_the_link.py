@@ -8,13 +8,15 @@ from typing import Any
 
 import pytest
 
+from telemetry.application.arguments import check_arguments
+from telemetry.application.commands import find_command
 from telemetry.application.depth_source import DepthSource
 from telemetry.application.order_answers import Answers
 from telemetry.application.place import StringPlace
 from telemetry.application.seal_watch import SealWatch, refusal_of
 from telemetry.application.series import SequenceCounter
 from telemetry.application.standstill import Standstill, is_undated
-from telemetry.errors import MediumError
+from telemetry.errors import CommandError, MediumError
 from telemetry.frozen import replace
 from telemetry.media.memory import MemoryMedium, joined_ports
 from telemetry.media.port import PortFrame, Priority, TubeEnd
@@ -303,3 +305,34 @@ def test_ends_of_one_rig_that_face_each_other_are_joined_and_an_end_is_taken_onc
     one.close()
     again = medium.open_port(low)
     assert (again.other, other.other) == (other, again)
+
+
+# orders and flags
+
+
+@pytest.mark.parametrize(
+    ("name", "action", "given", "found"),
+    [
+        ("static_record", "", {"seconds": 5.0}, {"seconds": 5.0}), ("static_record", "", {"seconds": 4.999}, None),
+        ("static_record", "", {"seconds": 3600.0}, {"seconds": 3600.0}), ("static_record", "", {"seconds": True}, None),
+        ("resend", "", {"first": 1, "last": 2}, {"first": 1, "last": 2}),
+        ("resend", "", {"first": 1.5, "last": 2}, None),
+        ("resend", "", {"first": 1}, None), ("take_survey", "", {"seconds": 5.0}, None), ("take_survey", "", {}, {}),
+    ],
+)  # fmt: skip
+def test_arguments_of_an_order_are_those_of_the_table_in_their_ranges(
+    name: str, action: str, given: dict[str, Any], found: dict[str, Any] | None
+) -> None:
+    spec = find_command(name, action)
+    if found is None:
+        with pytest.raises(CommandError):
+            check_arguments(spec, given)
+    else:
+        assert check_arguments(spec, given) == found
+
+
+def test_each_flag_of_a_node_is_a_bit_of_its_own() -> None:
+    flags = {name: int(flag) for name, flag in NodeFlag.__members__.items() if name != "NONE"}
+    assert [value.bit_length() - 1 for value in flags.values()] == list(range(len(flags)))
+    assert all(value.bit_count() == 1 for value in flags.values())
+    assert int(NodeFlag.NONE) == 0
