@@ -11,7 +11,8 @@ from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Direction, known_direction
 from groundstation.survey.fusion.sphere_direction import SphereDirection
 from groundstation.survey.well.depth_errors import StationDepth
-from groundstation.survey.well.trajectory import BLOCK, Trajectory
+from groundstation.survey.well.trajectory import Trajectory
+from groundstation.survey.well.trajectory_stations import BLOCK
 
 WIDTH = 9  # columns in all
 
