@@ -26,6 +26,7 @@ from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import BASE, ENCODER, Side, address_name
 from telemetry.runtime.event_loop import run_event_loop, stop_on_signals
 from telemetry.runtime.hosting import Place, begin_process, reporting_errors, rig_session, warn_of_keys, write_warning
+from telemetry.runtime.kept_memory import keep_freed_memory
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.step_client import AsyncStepClient, serve_stepped
 from telemetry.runtime.timing import CycleTiming
@@ -99,8 +100,10 @@ def run_on_thread(act: Callable[[], None]) -> threading.Thread:
 def start_ground_process(config: GroundConfig, run_apart: RunApart | None = None) -> GroundProcess:
     """Return a ground station with everything computed and the longest answer made once, so that no first query waits.
 
-    Nor does one wait for a garbage collection over what was imported and restored (0.1 s of ten thousand surveys).
+    Nor does one wait for a garbage collection over what was imported and restored (0.1 s of ten thousand surveys), or
+    for memory that an answer before it had, see ``kept_memory``.
     """
+    keep_freed_memory()
     process = GroundProcess(config, run_apart=run_apart)
     process.operator.ask_json("measurements")
     gc.freeze()

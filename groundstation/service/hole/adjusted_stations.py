@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -36,7 +37,7 @@ class AdjustedStations:
     Parameters
     ----------
     collar : direction there
-    directions : by depth (m), from the top down
+    mds, directions : depths (m) and directions, from the top down
     moved : where the hole moved
     found : the adjustment; None where the surveys have no solution in common
     told : direction at the collar as it was told
@@ -45,12 +46,18 @@ class AdjustedStations:
     """
 
     collar: Direction
-    directions: dict[float, Direction] = field(default_factory=dict)
+    mds: Sequence[float] = ()
+    directions: Sequence[Direction] = ()
     moved: list[Moved] = field(default_factory=list)
     found: Adjusted | None = None
     told: Direction | None = None
     below: Sequence[SurveyStation] = ()
     stops: ResolvedStops | None = None
+
+    def direction_at(self, md: float) -> Direction:
+        """Direction at the station at a depth (m); where there is none, that of the collar."""
+        place = bisect_left(self.mds, md)
+        return self.directions[place] if place < len(self.mds) and self.mds[place] == md else self.collar
 
     def turned_back(self) -> list[float]:
         """Depths (m) of stations whose surveys point back against those of the one above."""
@@ -108,11 +115,10 @@ def adjusted_stations(
     """
     mds = [one.md for one in below]
     if examined is None:
-        alone = dict(zip(mds, map(fused_alone, below), strict=True))
-        return AdjustedStations(told, alone, told=told, below=below, stops=stops)
-    collar, *found = directions_of(examined.examination, shared, north)
+        return AdjustedStations(told, mds, [*map(fused_alone, below)], told=told, below=below, stops=stops)
+    found = directions_of(examined.examination, shared, north)
     moved = moved_stations(examined, below)
-    return AdjustedStations(collar, dict(zip(mds, found, strict=True)), moved, examined.drawn, told, below, stops)
+    return AdjustedStations(found[0], mds, found[1:], moved, examined.drawn, told, below, stops)
 
 
 def fused_alone(station: SurveyStation) -> Direction:

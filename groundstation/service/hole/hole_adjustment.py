@@ -23,10 +23,11 @@ from groundstation.service.hole.string_prior import Hanging, prior_of_string
 from groundstation.survey.adjustment.blunders import Examination
 from groundstation.survey.adjustment.looks import OF_TUBE, Looks, PathPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
-from groundstation.survey.fusion.packed import Packed
+from groundstation.survey.fusion.direction_run import DirectionRun
+from groundstation.survey.fusion.packed import as_places
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import SharedErrors
-from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR, SphereDirection, tangent_errors
+from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR, tangent_errors
 from groundstation.survey.fusion.tangents import tangents_of
 from groundstation.survey.fusion.trust_level import Trust
 
@@ -115,7 +116,7 @@ class HoleAdjustment:
         """Looks of rows of the table in the order of time, with their mean forces, at their stations along a path."""
         numbers, which = number_values(seen["chain"])
         hung = chains.hung(numbers)[which]
-        systematic = seen["systematic_var"]
+        systematic = np.ascontiguousarray(seen["systematic_var"])  # of a column in wide rows the next line is slow
         least = np.full(len(numbers), math.inf)
         np.minimum.at(least, which, systematic)
         causes = chains.causes(least)
@@ -199,7 +200,7 @@ def noise_of(seen: Rows, tube_of: Places) -> Array:
     return np.where(own > LOUD * usual, own, OWN_SHARE * own + (1.0 - OWN_SHARE) * usual)
 
 
-def directions_of(examination: Examination, shared: SharedErrors, north_std: float) -> list[SphereDirection]:
+def directions_of(examination: Examination, shared: SharedErrors, north_std: float) -> DirectionRun:
     """Directions of the collar and the stations below it, from the top down.
 
     The encoder's zero against north (rad) turns them all about the vertical and is in no look: it is one more column.
@@ -207,17 +208,14 @@ def directions_of(examination: Examination, shared: SharedErrors, north_std: flo
     """
     adjusted = examination.drawn
     bases, tangents = adjusted.bases, adjusted.now.tangents
-    own = np.swapaxes(bases, 1, 2) @ adjusted.own_covs[:, :2, :2] @ bases
-    turned = north_std * np.stack([-tangents[:, 1], tangents[:, 0], np.zeros(len(tangents))], axis=1)
+    across = np.swapaxes(bases, 1, 2)
+    own = across @ adjusted.own_covs[:, :2, :2] @ bases
     of_looks = adjusted.direction_columns
     if examination.supposed is not None:
         of_looks = np.concatenate([of_looks, examination.suspected[:, :, None]], axis=2)
-    columns = np.concatenate([np.swapaxes(bases, 1, 2) @ of_looks, turned[:, :, None]], axis=2)
-    places = shared.adjusted_places(columns.shape[2])
-    width = shared.count
-    found = []
-    for tangent, cov, values in zip(tangents, own, columns, strict=True):
-        packed = Packed.of_values(values, places, width)
-        places = packed.places  # all share them
-        found.append(SphereDirection(tangent, cov, packed))
-    return found
+    count = of_looks.shape[2] + 1
+    columns = np.empty((3, len(tangents), count))
+    np.matmul(across, of_looks, out=np.swapaxes(columns, 0, 1)[:, :, :-1])
+    columns[:, :, -1] = north_std * np.stack([-tangents[:, 1], tangents[:, 0], np.zeros(len(tangents))])
+    places = shared.adjusted_places(count)  # which may be new
+    return DirectionRun(tangents, own, columns, as_places(places, shared.count), shared.count)

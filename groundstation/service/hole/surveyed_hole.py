@@ -253,7 +253,7 @@ class SurveyedHole:
         """Direction of a station without transport; that of the collar is the collar's where the hole is adjusted."""
         if not self._is_adjusted:
             return station.fused(self._config.weighting)
-        return self._stands.directions.get(station.md, self._stands.collar)
+        return self._stands.direction_at(station.md)
 
     @property
     def has_transport(self) -> bool:
@@ -332,7 +332,10 @@ class SurveyedHole:
 
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
         depths = self._depths.of_stations(changed, self.version, learns=self._is_adjusted)
-        self._trajectory.put(self._directions(changed), depths)
+        if self._is_adjusted and not self.has_transport:
+            self._trajectory.put_below(self._stands.mds, self._stands.directions, depths)
+        else:
+            self._trajectory.put(self._directions(changed), depths)
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)
         if worst is not None:
@@ -360,8 +363,6 @@ class SurveyedHole:
         one below too.
         """
         if not self.has_transport:
-            if self._is_adjusted:
-                return [*self._stands.directions.items()]
             return [(one.md, one.fused(self._config.weighting)) for one in changed if one.md > 0.0]
         measured = [(one.md, self._found(one)) for one in self._stations.below]
         if not measured:

@@ -103,13 +103,15 @@ class Adjusted:
     @cached_property
     def columns(self) -> Array:
         """Change of every state (s + 1, 4, p) for one standard deviation of independent errors in common."""
+        if (sparse := self.solution.sparse) is not None:
+            return self.solution.rooted_columns(sparse)
         flat = self.by_common.reshape(-1, self.by_common.shape[2])
         return self.solution.in_common.times_root(flat).reshape(self.by_common.shape)
 
     @cached_property
     def direction_columns(self) -> Array:
         """Change of every direction (s + 1, 2, p), likewise: half of the work, where curvatures are not asked for."""
-        if "columns" in self.__dict__:
+        if "columns" in self.__dict__ or self.solution.sparse is not None:
             return np.ascontiguousarray(self.columns[:, :2])
         width = self.by_common.shape[2]
         flat = np.ascontiguousarray(self.by_common[:, :2]).reshape(-1, width)

@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.kernels.observations import mirror_upper
+from groundstation.survey.adjustment.kernels.path_elimination import reduce_right, substitute_path
+from groundstation.survey.adjustment.kernels.sparse_products import add_rooted
 
 Array = npt.NDArray[np.float64]
 KEPT = ("factor", "cov", "root", "variances")  # of equations, whatever stands on their right side
@@ -124,6 +126,7 @@ class LinearSolution:
     of_path: float
     at_station: Array
     whole: Array
+    sparse: Array | None = None
 
     @property
     def cov(self) -> Array:
@@ -134,6 +137,22 @@ class LinearSolution:
     def common(self) -> Array:
         """Step (p,) of what stations have in common."""
         return self.in_common.step
+
+    def rooted_columns(self, sparse: Array) -> Array:
+        """Change of every state (s + 1, 4, p) for one standard deviation of independent errors in common.
+
+        It is -S^-1 (C R) in this order: C R costs what stands in C, and -S^-1 C times R a product of full matrices.
+
+        Parameters
+        ----------
+        sparse : C
+        """
+        root = self.in_common.root
+        found = np.zeros((len(sparse), self.diagonal.shape[1], len(root)))
+        add_rooted(sparse, root, -1.0, found)
+        reduce_right(self.diagonal, self.tied, found)
+        substitute_path(self.diagonal, self.tied, found)
+        return found
 
     @property
     def step(self) -> float:

@@ -13,6 +13,7 @@ from groundstation.survey.adjustment.kernels.observations import (
     add_looks,
     add_right_sides,
     linearise_looks,
+    mirror_upper,
     weigh_down,
 )
 from groundstation.survey.adjustment.kernels.path_elimination import (
@@ -20,6 +21,7 @@ from groundstation.survey.adjustment.kernels.path_elimination import (
     reduce_right,
     substitute_path,
 )
+from groundstation.survey.adjustment.kernels.sparse_products import add_squares
 from groundstation.survey.adjustment.linear_solution import InCommon, LinearSolution
 from groundstation.survey.adjustment.looks import OF_TUBE, TURN, FurtherEffects, Looks, StartingPoint
 
@@ -28,6 +30,7 @@ Places = npt.NDArray[np.intp]
 MANY = 1500  # looks, from which on later steps go by the equations of the first, whose right sides alone are made anew
 WIDE = 150  # unknowns in common, from which on it is worth to leave out columns of tubes that are zero
 TOGETHER = 64  # stations whose squares are summed at once
+SPARSE = 8  # times as many places as numbers, from which on what is zero is left out of products
 TILTS = slice(5, 7)  # of the unknowns of a look
 GROSS = 16.27  # chi-square of three beyond which a look counts less: one in a thousand
 
@@ -35,6 +38,20 @@ GROSS = 16.27  # chi-square of three beyond which a look counts less: one in a t
 def are_many(looks: Looks) -> bool:
     """Whether looks are so many that an adjustment begins where one of some of them ended, and makes equations once."""
     return len(looks) >= MANY
+
+
+def kept_sparse(coupled: Array, size: int) -> Array | None:
+    """Copy (s + 1, 2, p) of what couples directions and what they have in common; None where little of it is zero.
+
+    Parameters
+    ----------
+    coupled : (s + 1, 4, p + 1), before the path is taken out
+    size : p
+    """
+    of_directions = coupled[:, :2, :size]
+    if size < WIDE or SPARSE * np.count_nonzero(of_directions) > of_directions.size:
+        return None
+    return of_directions.copy()
 
 
 def linearise_all(looks: Looks, now: StartingPoint, bases: Array, extra: FurtherEffects) -> Linearised:
@@ -66,6 +83,7 @@ def solve_equations(
     equations = gather_equations(looks, linear, of_path, known, departure, extra)
     diagonal, tied, coupled, in_common = equations.diagonal, equations.tied, equations.coupled, equations.in_common
     size, own = len(known), coupled[:, :, -1]
+    sparse = kept_sparse(coupled, size)
     whole = in_common[:size, :size].copy()
     if size < WIDE:
         eliminate_path(diagonal, tied, coupled, *whole_columns(coupled))
@@ -74,13 +92,16 @@ def solve_equations(
     else:
         ends = tube_columns(looks, len(diagonal), linear.places)
         eliminate_path(diagonal, tied, coupled, ends, linear.gravity_at)
-        take_squares(coupled, ends, linear.gravity_at, in_common)
+        if sparse is None:
+            take_squares(coupled, ends, linear.gravity_at, in_common)
+        else:
+            take_sparse_squares(sparse, diagonal, tied, coupled, in_common)
     left = InCommon(in_common[:size, :size], in_common[:size, size])
     states = (own - coupled[:, :, :size] @ left.step)[:, :, None].copy()
     substitute_path(diagonal, tied, states)
     gain = float(np.sum(own * own))
     return LinearSolution(
-        diagonal, tied, coupled[:, :, :size], left, states[:, :, 0], gain, equations.at_station, whole
+        diagonal, tied, coupled[:, :, :size], left, states[:, :, 0], gain, equations.at_station, whole, sparse
     )
 
 
@@ -121,6 +142,22 @@ def take_squares(coupled: Array, ends: Places, tail: int, in_common: Array) -> N
         in_common[:end, tail:] -= squares[:end, end:]
         in_common[tail:, :end] -= squares[end:, :end]
         in_common[tail:, tail:] -= squares[end:, end:]
+
+
+def take_sparse_squares(sparse: Array, diagonal: Array, tied: Array, coupled: Array, in_common: Array) -> None:
+    """Take C^T S^-1 C, of a C that is mostly zero, and its right side from ``in_common`` (p + 1, p + 1).
+
+    Parameters
+    ----------
+    sparse : C (s + 1, 2, p)
+    diagonal, tied, coupled : as ``eliminate_path`` leaves them
+    """
+    size, flat = sparse.shape[2], coupled.reshape(-1, coupled.shape[2])
+    by_common = -coupled[:, :, :size]
+    substitute_path(diagonal, tied, by_common)
+    add_squares(sparse, by_common, in_common)
+    mirror_upper(in_common, size)
+    in_common[:size, size] -= flat[:, :size].T @ flat[:, size]
 
 
 def solve_again(

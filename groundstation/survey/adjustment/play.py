@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.kernels.observations import add_looks
+from groundstation.survey.adjustment.kernels.sparse_products import add_rooted
 from groundstation.survey.adjustment.looks import OF_TUBE
 from groundstation.survey.adjustment.normal_equations import WIDE
 
@@ -52,10 +53,14 @@ def told_by_all(found: Adjusted, weights: Array) -> float:
         looks.station, looks.tube, looks.make_up, linear.jacobians, weights, linear.residuals, found.extra.columns,
         linear.places, linear.gravity_at, own, coupled, in_common,
     )  # fmt: skip
-    both = own @ found.by_common[:, :2] + 2.0 * coupled[:, :, :size]
     # the covariance is R R^T: times B^T (N B + 2 C) its trace is that of (B R)^T (N B + 2 C) R
-    rooted = found.solution.in_common.times_root(both.reshape(-1, size))
-    of_path = np.sum(rooted * found.direction_columns.reshape(-1, size))
+    if found.solution.sparse is not None:
+        rooted = own @ found.direction_columns
+        add_rooted(coupled, found.common_root, 2.0, rooted)
+    else:
+        both = own @ found.by_common[:, :2] + 2.0 * coupled[:, :, :size]
+        rooted = found.solution.in_common.times_root(both.reshape(-1, size)).reshape(count, 2, size)
+    of_path = np.sum(rooted * found.direction_columns)
     return float(np.sum(own * found.own_covs[:, :2, :2]) + of_path) + _told_in_common(found, in_common[:size, :size])
 
 

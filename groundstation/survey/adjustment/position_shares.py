@@ -34,7 +34,8 @@ def position_shares(found: Adjusted, causes: TurnCauses) -> list[ErrorShare]:
     common = found.solution.in_common.times_root_transposed(rooted.reshape(-1, rooted.shape[2]))
     collar, path = _of_path(found, common, halves, wholes)
     of_path = [ErrorShare(ShareSource.COLLAR, -1, collar), ErrorShare(ShareSource.PATH, -1, path)]
-    shares = [*shares_of_string(found, common.T, causes), *of_path]
+    unknowns = np.ascontiguousarray(common.T)  # of which sums are made row by row
+    shares = [*shares_of_string(found, unknowns, causes), *of_path]
     return [ErrorShare(one.source, one.subject, one.variances.reshape(-1, 3)) for one in shares]
 
 

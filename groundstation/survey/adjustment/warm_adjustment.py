@@ -22,6 +22,7 @@ from groundstation.survey.adjustment.kernels.path_elimination import (
 )
 from groundstation.survey.adjustment.kernels.path_legs import add_legs, bend_to, leg_departures, leg_squares
 from groundstation.survey.adjustment.kernels.position_sums import position_sums
+from groundstation.survey.adjustment.kernels.sparse_products import add_rooted, add_squares
 
 
 def warm_adjustment() -> None:
@@ -57,6 +58,8 @@ def warm_adjustment() -> None:
     reduce_right(diagonal, tied, coupled)
     substitute_path(diagonal, tied, coupled)
     path_covariances(diagonal, tied, np.zeros((1, 4, 4)))
+    add_rooted(coupled, common[:width, :width].copy(), 1.0, coupled.copy())
+    add_squares(coupled, coupled, common)
     legs, place = (diagonal[:0], diagonal[:0]), (tangents, bases, np.zeros((1, 2)))
     bend_to(tangents[0], tangents[0], bases[0], np.zeros(2))
     add_legs(*legs, one[:0], *place, diagonal, tied, np.zeros((1, 4)))

@@ -8,8 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-Places = npt.NDArray[np.intp]
+Places = npt.NDArray[Any]  # of few bits where these are enough
 MOST_OF_16_BITS = 1 << 16
+
+
+def as_places(places: Places, width: int) -> Places:
+    """Places as they are kept of ``width`` columns; the same array where they are so already."""
+    return places.astype(np.uint16 if width <= MOST_OF_16_BITS else np.intp, copy=False)
 
 
 class Packed:
@@ -27,7 +32,7 @@ class Packed:
     def __init__(self, columns: Array, places: Places | None = None) -> None:
         """``places`` of those that are not zero, where they are known."""
         at = np.nonzero(columns.any(axis=0))[0] if places is None else places
-        self.places: npt.NDArray[Any] = at.astype(np.uint16 if columns.shape[1] <= MOST_OF_16_BITS else np.intp)
+        self.places = as_places(at, columns.shape[1])
         self.values: Array = columns.take(at, axis=1)
         self.width = int(columns.shape[1])
 
@@ -35,7 +40,7 @@ class Packed:
     def of_values(cls, values: Array, places: Places, width: int) -> Packed:
         """Columns of which ``values`` (k, c) stand at ``places`` (c,), of ``width``."""
         made = cls.__new__(cls)
-        made.places = places.astype(np.uint16 if width <= MOST_OF_16_BITS else np.intp, copy=False)
+        made.places = as_places(places, width)
         made.values, made.width = values, width
         return made
 

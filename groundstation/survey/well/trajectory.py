@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
+from groundstation.survey.fusion.direction_run import DirectionRun
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import add_shared_errors
 from groundstation.survey.fusion.tangents import tangents_of
@@ -84,7 +85,7 @@ class Trajectory:
 
     def __len__(self) -> int:
         """Number of points."""
-        return len(self._stations.directions)
+        return len(self._stations)
 
     def __getitem__(self, place: int) -> TrajectoryPoint:
         place = range(len(self))[place]
@@ -101,44 +102,44 @@ class Trajectory:
     @property
     def md(self) -> Array:
         """Depths (n,) of the points, m."""
-        return np.asarray(self._stations.rows["md"][: len(self._stations.directions)])
+        return np.asarray(self._stations.rows["md"][: len(self._stations)])
 
     @property
     def tangent_covs(self) -> Array:
         """Covariances (n, 3, 3) of the directions, of each the part that no other shares."""
-        return np.asarray(self._stations.rows["own"][: len(self._stations.directions)])
+        return np.asarray(self._stations.rows["own"][: len(self._stations)])
 
     @property
     def positions(self) -> Array:
         """Positions (n, 3) of the points, m."""
-        return np.asarray(self._stations.rows["position"][: len(self._stations.directions)])
+        return np.asarray(self._stations.rows["position"][: len(self._stations)])
 
     @property
     def tangents(self) -> Array:
         """Tangents (n, 3) at the points."""
-        return np.asarray(self._stations.rows["tangent"][: len(self._stations.directions)])
+        return np.asarray(self._stations.rows["tangent"][: len(self._stations)])
 
     @property
     def covs(self) -> Array:
         """Covariances (n, 3, 3) of the positions, m^2."""
-        return np.asarray(self._stations.rows["cov"][: len(self._stations.directions)])
+        return np.asarray(self._stations.rows["cov"][: len(self._stations)])
 
     @property
     def path_covs(self) -> Array:
         """Covariances (n, 3, 3), m^2, that the path between the stations makes of ``covs``."""
-        return np.asarray(self._stations.rows["path"][: len(self._stations.directions)])
+        return np.asarray(self._stations.rows["path"][: len(self._stations)])
 
     @property
     def depth_covs(self) -> Array:
         """Covariances (n, 3, 3), m^2, that the own errors of depths make of ``covs``; what they share has columns."""
-        rows = self._stations.rows[: len(self._stations.directions)]
+        rows = self._stations.rows[: len(self._stations)]
         along = rows["along"]
         return np.asarray(rows["kinks"] + rows["depth_var"][:, None, None] * (along[:, :, None] * along[:, None]))
 
     @property
     def turned_back(self) -> list[float]:
         """Depths (m) of the stations that point back against the one above: the hole is not what is drawn there."""
-        tangents = self._stations.rows["tangent"][: len(self._stations.directions)]
+        tangents = self._stations.rows["tangent"][: len(self._stations)]
         return [float(md) for md in self.md[1:][(tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK]]
 
     def append(self, md: float, direction: Direction, depth: StationDepth = EXACT) -> TrajectoryPoint:
@@ -195,7 +196,7 @@ class Trajectory:
         SurveyError
             When a depth is not below the first; then none is put.
         """
-        changed, collar, known = list[int](), float(self._stations.rows["md"][0]), len(self._stations.directions)
+        changed, collar, known = list[int](), float(self._stations.rows["md"][0]), len(self._stations)
         stations = sorted(stations, key=itemgetter(0))
         for md, _ in stations:
             if not collar < md < math.inf:
@@ -205,7 +206,7 @@ class Trajectory:
             changed, stations = list(range(known, len(self))), []
         for md, direction in stations:
             place = int(np.searchsorted(self.md, md))
-            if place == len(self._stations.directions) or self._stations.rows["md"][place] != md:
+            if place == len(self._stations) or self._stations.rows["md"][place] != md:
                 self._stations.insert(place, md, direction)
             elif self._stations.directions[place] is direction:
                 continue
@@ -215,6 +216,34 @@ class Trajectory:
         self._stations.direct(changed)
         if changed:
             self._draw(changed[0])
+
+    def put_below(
+        self, mds: Sequence[float], directions: Sequence[Direction], depths: Mapping[float, StationDepth] = ALL_EXACT
+    ) -> None:
+        """Put stations below all others; the same bit for bit as ``put``, and faster where they are side by side.
+
+        Parameters
+        ----------
+        mds : m, growing
+        directions : at these
+        depths : errors of their depths, by these; one that is missing is exact
+
+        Raises
+        ------
+        SurveyError
+            When a depth does not grow; then none is put.
+        """
+        known = len(self)
+        for before, md in itertools.pairwise([float(self._stations.rows["md"][known - 1]), *mds]):
+            if not before < md < math.inf:
+                raise SurveyError(f"trajectory: expected a depth beyond {before:g} m, got {md:g} m")
+        if isinstance(directions, DirectionRun):
+            self._stations.append_run(mds, directions, depths)
+        else:
+            self._stations.append_all([*zip(mds, directions, strict=True)], depths)
+            self._stations.direct(range(known, len(self)))
+        if mds:
+            self._draw(known)
 
     def bend_as(self, wander: LegWander, driven: Array, ties: Sequence[CollarTie] = UNTIED) -> None:
         """Take another wander of the path, for what is drawn from now on.
@@ -324,7 +353,7 @@ class Trajectory:
             begin -= begin % BLOCK
             del self._kept[begin + 1 :], self._marks[begin // BLOCK + 1 :]
             self._sums = self._marks[-1]
-        end = len(self._stations.directions)
+        end = len(self._stations)
         rows = self._stations.rows[begin:end]
         legs = leg_displacements(self.method, rows["md"], rows["tangent"])
         more = self._go_along(begin, rows, legs)

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.survey.fusion.direction_run import DirectionRun
 from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.sphere_direction import tangent_errors
@@ -21,6 +22,7 @@ from groundstation.survey.well.depth_errors import EXACT, StationDepth
 from groundstation.survey.well.trajectory_rows import FEWEST, GROWTH, ROW, Followed, TrajectorySums, runs_of
 
 Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
 BLOCK = 64  # stations from mark to mark
 PLACES, VALUES = map(attrgetter, ("places", "values"))
 DEPTH_PLACES, DEPTH_VALUES = map(attrgetter, ("columns.places", "columns.values"))
@@ -36,42 +38,69 @@ class TrajectoryStations:
     Attributes
     ----------
     rows : numbers of each, some of them not used yet
-    directions, depths : of each
+    depths : of each
     """
 
     def __init__(self) -> None:
         self.rows = np.zeros(FEWEST, ROW)
-        self.directions: list[Direction] = []
         self.depths: list[StationDepth] = []
-        self._columns: list[Packed] = []  # (3, s), of each direction
+        self._single: list[Direction] = []  # above those that are side by side
+        self._columns: list[Packed] = []  # (3, s), of each of these
+        self._run: DirectionRun | None = None
         self._depths_share = False  # whether any depth ever had columns
 
     def __len__(self) -> int:
-        return len(self.directions)
+        return len(self.depths)
+
+    @property
+    def directions(self) -> list[Direction]:
+        """Of each, one by one."""
+        run, self._run = self._run, None
+        for direction in run or ():
+            self._single.append(direction)
+            self._columns.append(direction.packed)
+        return self._single
 
     def insert(self, place: int, md: float, direction: Direction) -> None:
         """Insert a row for a station; what follows from its direction is not in it yet."""
-        known, count = self.rows, len(self.directions)
+        directions, known, count = self.directions, self.rows, len(self)
         if count == len(known):
             self.rows = np.zeros(count + 1 + count // GROWTH, ROW)
             self.rows[:count] = known
         self.rows[place + 1 : count + 1] = self.rows[place:count]
         self.rows["md"][place] = md
-        self.directions.insert(place, direction)
+        directions.insert(place, direction)
         self._columns.insert(place, NONE)
         self.depths.insert(place, EXACT)
 
     def append_all(self, stations: Sequence[tuple[float, Direction]], depths: Mapping[float, StationDepth]) -> None:
         """Append stations (m, direction) in their order; a depth that is not told is exact."""
-        count, more = len(self), len(stations)
+        directions = self.directions
+        self._append_depths([md for md, _ in stations], depths)
+        directions += [direction for _, direction in stations]
+        self._columns += [NONE] * len(stations)
+
+    def append_run(self, mds: Sequence[float], run: DirectionRun, depths: Mapping[float, StationDepth]) -> None:
+        """Append stations (m) side by side, with what depends on their own direction alone; see ``append_all``."""
+        self._single, begin = self.directions, len(self)
+        self._append_depths(mds, depths)
+        self._run, rows = run, self.rows[begin : len(self)]
+        rows["tangent"], rows["own"], rows["count"] = run.tangents, run.owns, len(run.places)
+        rows["depth_var"] = [depth.own_var for depth in self.depths[begin:]]
+        by_depth = [depth.columns for depth in self.depths[begin:]]
+        rows["depths"] = [len(columns.places) for columns in by_depth]
+        widths = [columns.width for columns in by_depth]
+        rows["width"] = np.maximum(widths, run.width)
+        self._depths_share |= any(widths)
+
+    def _append_depths(self, mds: Sequence[float], depths: Mapping[float, StationDepth]) -> None:
+        """Append rows of stations (m) with their depths."""
+        count, more = len(self), len(mds)
         if count + more > len(self.rows):
             known, self.rows = self.rows[:count], np.zeros(count + more + count // GROWTH, ROW)
             self.rows[:count] = known
-        for md, direction in stations:
-            self.directions.append(direction)
-            self.depths.append(depths.get(md, EXACT))
-        self.rows["md"][count : count + more] = [md for md, _ in stations]
-        self._columns += [NONE] * more
+        self.rows["md"][count : count + more] = mds
+        self.depths += [depths.get(md, EXACT) for md in mds]
 
     def direct(self, places: Sequence[int], tangents: Array | None = None) -> None:
         """Compute the rows at some places that depend on their own direction alone.
@@ -83,7 +112,8 @@ class TrajectoryStations:
         """
         if not places:
             return
-        directions = [*map(self.directions.__getitem__, places)]
+        all_directions = self.directions
+        directions = [*map(all_directions.__getitem__, places)]
         if tangents is None:
             tangents = tangents_of(directions)
         rows = self.rows
@@ -113,7 +143,20 @@ class TrajectoryStations:
 
     def tangent_columns(self, place: int) -> Array:
         """Shared columns (3, s) of the tangent at a station."""
-        return self._columns[place].columns()
+        above = len(self._columns)
+        found = self._columns[place] if self._run is None or place < above else self._run[place - above].packed
+        return found.columns()
+
+    def _flat_columns(self, begin: int, end: int) -> tuple[Places, Array]:
+        """Places (c,) and values (3, c) of the columns of stations from one place up to another, one after another."""
+        above, run = len(self._columns), self._run
+        columns = self._columns[begin:end]
+        places, values = [*map(PLACES, columns)], [*map(VALUES, columns)]
+        if run is not None:
+            beside = run.columns[:, max(begin - above, 0) : max(end - above, 0)]
+            places.append(np.tile(run.places, beside.shape[1]))
+            values.append(beside.reshape(3, -1))
+        return np.concatenate(places).astype(np.intp, copy=False), np.concatenate(values, axis=1)
 
     def follow(self, sums: TrajectorySums, begin: int, end: int, *, with_columns: bool) -> Followed:
         """Continue ``sums`` from one place to another."""
@@ -121,11 +164,10 @@ class TrajectoryStations:
             add_stations,  # reading alone needs no compiler
         )
 
-        rows, columns = self.rows[begin : end + 1], self._columns[begin : end + 1]
-        depths, count, known = self.depths[begin : end + 1], end - begin, sums.passed.shape[1]
+        rows, depths = self.rows[begin : end + 1], self.depths[begin : end + 1]
+        count, known = end - begin, sums.passed.shape[1]
         widths = np.maximum(np.maximum.accumulate(rows["width"])[1:], known)
-        places = np.concatenate([*map(PLACES, columns)]).astype(np.intp, copy=False)
-        values = np.concatenate([*map(VALUES, columns)], axis=1)
+        places, values = self._flat_columns(begin, end + 1)
         lean, down = values[:2], values[2]
         depth_places, by_depth = NO_PLACES, NOTHING
         if self._depths_share:

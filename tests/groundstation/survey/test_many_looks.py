@@ -68,12 +68,13 @@ def dense_solution(drawn: DrawnString, now: StartingPoint, extra: FurtherEffects
     return np.asarray(step, np.float64), np.asarray(cov, np.float64)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(
     seed=st.integers(0, 10_000), share=st.floats(0.2, 1.0), shuffled=st.booleans(), extras=st.integers(0, 2),
+    sparse=st.sampled_from([0, NEVER]),
 )  # fmt: skip
 def test_a_step_of_many_looks_is_that_of_one_matrix_of_all_unknowns(
-    seed: int, share: float, shuffled: bool, extras: int
+    seed: int, share: float, shuffled: bool, extras: int, sparse: int
 ) -> None:
     drawn = some_looks(seed, share, shuffled=shuffled)
     looks, random = drawn.looks, np.random.default_rng([seed, 8])
@@ -85,6 +86,7 @@ def test_a_step_of_many_looks_is_that_of_one_matrix_of_all_unknowns(
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(normal_equations, "MANY", 1)
         patched.setattr(normal_equations, "TOGETHER", 5)
+        patched.setattr(normal_equations, "SPARSE", sparse)
         found = solve_equations(looks, linear, of_path, known, departure, extra)
     again = solve_again(found, looks, linear, path_equations(drawn.path, now, bases)[2], -known @ departure, extra)
     step, cov = dense_solution(drawn, now, extra)
