@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import datetime
 import random
 import struct
 from collections import Counter
@@ -13,6 +12,7 @@ from pathlib import Path
 import pytest
 from c_library import load_checked
 from needed_programs import needs_gcc
+from seal_keys import REASONS, ring_of
 
 from node.firmware.key_page import KEY_PAGE, pack_key_page, write_key_page
 from telemetry.application.end_seal import BaseEnd, SealFinding
@@ -20,7 +20,7 @@ from telemetry.application.measurement_seal import MeasurementSeal
 from telemetry.frozen import replace
 from telemetry.messages import BASE, ENCODER, Aiding
 from telemetry.transport.joint_seal import HEAD, JointSeal
-from telemetry.transport.key_ring import Generation, KeyRing, keys_of, pack_ring
+from telemetry.transport.key_ring import KeyRing, pack_ring
 from telemetry.transport.seal import TAG_SIZE
 
 FIRMWARE = Path(__file__).parents[2] / "firmware"
@@ -29,19 +29,7 @@ SOURCES += [FIRMWARE / "tube" / name for name in ("key_page.c", "seal_counts.c",
 SHIM = Path(__file__).parent / "seal_shim.c"
 CHIP, TUBE, OTHER = 2, 3, 4
 ROOM = 600
-AT = datetime.datetime(2026, 5, 4, tzinfo=datetime.UTC)
-SECRETS = {number: bytes([number]) * 32 for number in range(1, 5)}
-REASONS = (
-    "unsealed", "wrong_tag", "wrong_joint", "repeated", "old_session", "end_unsealed", "end_wrong_tag",
-    "end_old_session", "end_old_order", "measurement_unsealed", "measurement_wrong_tag", "measurement_repeated",
-    "duplicate", "late", "before_joined",
-)  # fmt: skip
 pytestmark = needs_gcc
-
-
-def ring_of(address: int, *numbers: int, revoked: frozenset[int] = frozenset()) -> KeyRing:
-    generations = tuple(Generation(k, keys_of(SECRETS[k], address, revoked), AT) for k in numbers)
-    return KeyRing("rig-1", address, generations, revoked)
 
 
 @pytest.fixture(scope="module")
