@@ -299,7 +299,7 @@ def test_a_tube_and_the_base_end_to_end(library: ctypes.CDLL) -> None:
     assert order is not None
     assert chip.end_open(order, 3.0, is_offer=False)
     assert not chip.end_open(order, 3.0, is_offer=True)
-    assert not chip.end_open(b"an order that nobody sealed, of some length", 3.0, is_offer=False)
+    assert not chip.end_open(b"an order without a seal, of some length", 3.0, is_offer=False)
     assert chip.counters["seal_end_unsealed"] > 0
 
 
