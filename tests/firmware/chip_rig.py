@@ -11,8 +11,8 @@ from typing import Any
 
 from chip_in_process import ChipBetween, ChipNode, Neighbour
 
-from node.firmware.key_page import pack_key_page
 from node.firmware.tube_settings import MakeUpAngle, TubeSettings
+from node.process.key_page import pack_key_page
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.measurement_seal import MeasurementSeal
 from telemetry.application.seals import Keys, Seals

@@ -14,7 +14,7 @@ from c_library import load_checked
 from needed_programs import needs_gcc
 from seal_keys import REASONS, ring_of
 
-from node.firmware.key_page import KEY_PAGE, pack_key_page, write_key_page
+from node.process.key_page import KEY_PAGE, pack_key_page, write_key_page
 from telemetry.application.end_seal import BaseEnd, SealFinding
 from telemetry.application.measurement_seal import MeasurementSeal
 from telemetry.frozen import replace

@@ -13,7 +13,7 @@ from needed_programs import needs_gcc
 from seal_keys import REASONS, ring_of
 from sealed_string import make_folder
 
-from node.firmware.key_page import pack_key_page
+from node.process.key_page import pack_key_page
 from telemetry.media.can_exchange import CanData
 from telemetry.media.can_identifier import TUNNEL, packed_identifier
 from telemetry.media.isotp import Sender

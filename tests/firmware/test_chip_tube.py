@@ -22,9 +22,9 @@ from own_clock_surface import Surface, living
 from rigs import free_endpoint, started
 
 from borechain.pki.rig_keys import add_tube, init_rig
-from node.firmware.key_page import write_key_page
 from node.firmware.tube_settings import TubeSettings
 from node.process.counter import BootCounter
+from node.process.key_page import write_key_page
 from sim.can.can_hub import CanHub, running_hub
 from sim.world.recording import fastest_at, record_sensors, yaw_error
 from sim.world.scenario import scenario_of

@@ -86,8 +86,8 @@ def provision(request: TubeRequest, room: int, keys_place: Path | None, out: Pat
       borechain firmware provision --tube 3 --imu-gyroscope gyroscope.json --room 1 --out tube-3
       borechain firmware provision --tube 3 --keys stick --out tube-3
     """
-    from node.firmware.key_page import write_key_page
     from node.firmware.node_image import provision_node
+    from node.process.key_page import write_key_page
 
     settings = request.to_settings()
     make_folder(out)
