@@ -131,7 +131,7 @@ static bool read_of_reply(void *into, const uint8_t *key, uint32_t key_length, s
     if (text_is(key, key_length, "k")) {
         one->found |= 16u;
         if (!read_quantity(from, RATE_Q, &value) || value < INT64_C(1) << (RATE_Q - 1) ||
-            value > INT64_C(2) << RATE_Q) {
+            value > INT64_C(1) << (RATE_Q + 1)) {
             return false;
         }
         reply->rig_rate = (value * ONE + (INT64_C(1) << (RATE_Q - 1))) >> RATE_Q;
@@ -201,7 +201,7 @@ static bool read_of_aiding(void *into, const uint8_t *key, uint32_t key_length, 
     while (which < 13u && !text_is(key, key_length, keys[which])) {
         which++;
     }
-    one->found |= 1u << which;
+    one->found |= (uint32_t)1u << which;
     switch (which) {
     case 0:
         return read_bits(from, &told->yaw);

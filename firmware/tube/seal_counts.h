@@ -20,12 +20,12 @@ enum seal_reason {
     SEAL_MEASUREMENT_UNSEALED,
     SEAL_MEASUREMENT_WRONG_TAG,
     SEAL_MEASUREMENT_REPEATED,
-    SEAL_FAILURES, /* those before are told; what follows happens whenever a joint is made up */
-    SEAL_DUPLICATE = SEAL_FAILURES,
+    SEAL_DUPLICATE, /* this and what follows happen whenever a joint is made up, and are not told */
     SEAL_LATE,
     SEAL_BEFORE_JOINED,
     SEAL_REASONS
 };
+#define SEAL_FAILURES 12u /* the reasons that are told */
 
 /* Of one process; it begins as zeros. */
 struct seal_counts {

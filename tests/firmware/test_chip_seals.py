@@ -14,6 +14,7 @@ from seal_keys import REASONS, ring_of
 from sealed_string import make_folder
 
 from node.process.key_page import pack_key_page
+from telemetry.application.end_seal import DOWN, Pair, close_payload
 from telemetry.media.can_exchange import CanData
 from telemetry.media.can_identifier import TUNNEL, packed_identifier
 from telemetry.media.isotp import Sender
@@ -30,9 +31,10 @@ from telemetry.messages import (
     Side,
     SurveyMeasurement,
 )
+from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.transport.joint_seal import HEAD, JointSeal
 from telemetry.transport.key_ring import key_file, read_ring
-from telemetry.transport.seal import TAG_SIZE
+from telemetry.transport.seal import TAG_SIZE, SealKey
 
 LARGE = 2**31 + 7
 UNFIT = NodeFlag.YAW_UNTRUSTED | NodeFlag.CLOCK_UNSYNCHRONISED
@@ -238,6 +240,27 @@ def test_an_order_older_than_what_is_remembered_is_not_obeyed_again(
     rig.world.run(3.0)
     assert [reply.sequence for reply in rig.heard(Reply)] == [*range(50, 57), 56]
     assert refused(rig)["end_old_order"] >= 1
+
+
+def test_a_stolen_neighbour_orders_nothing(library: ctypes.CDLL, image: bytes, keys: Path) -> None:
+    """It has the keys of the joint, and not those of the base: an order in no seal, a changed one, one of its own."""
+    rig = Rig(library, image, keys=keys)
+    rig.world.run(6.0)
+    assert rig.base.endpoint.seals is not None
+    base = rig.base.endpoint.seals.base
+    assert base is not None
+    orders = [encode_message(Command(CHIP, number, "reboot", {})) for number in range(60, 63)]
+    sealed = bytearray(base.close(orders[1], CHIP) or b"")
+    sealed[20] ^= 1
+    theirs = close_payload(SealKey(bytes(16)), DOWN, orders[2], Pair(1, 2), 1, 1, CHIP)
+    for payload in (orders[0], bytes(sealed), theirs):
+        rig.base.endpoint._links[Side.LOWER].send_reliable(payload)
+    rig.world.run(3.0)
+    assert rig.heard(Reply) == []
+    assert {name: count for name, count in refused(rig).items() if name.startswith("end")} == {
+        "end_unsealed": 1,
+        "end_wrong_tag": 2,
+    }
 
 
 def test_a_page_of_another_tubes_keys_is_not_begun_with(library: ctypes.CDLL, image: bytes, keys: Path) -> None:
