@@ -21,7 +21,7 @@ struct clock_reply {
     int64_t rig_us;      /* rig time at replied_us */
     int64_t rig_var;     /* us^2, of that */
     int64_t rig_rate;    /* of the neighbour's clock, steps of 1e-9 */
-    uint16_t epoch;
+    uint32_t epoch;
 };
 
 /* It begins as zeros. */

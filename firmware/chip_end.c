@@ -12,6 +12,7 @@
 #define HELLO_PRIORITY 2u
 #define COMMAND_PRIORITY 3u
 #define SURVEY_PRIORITY 4u
+#define SEAL_TAG 8u
 #define CONSECUTIVE 2u /* type of a frame of ISO-TP */
 
 static uint32_t identifier_of(const struct chip_end *end, uint32_t priority, uint32_t type, uint32_t part)
@@ -37,7 +38,13 @@ void chip_end_begin(
     end->shown_at_ms = now_ms - PRESENCE_EVERY_MS;
     end->told_at_ms = now_ms - HEADER_EVERY_MS;
     link_begin(&end->link, address, boot_count);
-    (void)isotp_listen(&end->receivers[0], end->urgent, CHIP_END_URGENT);
+    end->link.close = calls->close_payload;
+    end->link.close_own = calls->own;
+    if (calls->seal == NULL) {
+        (void)isotp_listen(&end->receivers[0], end->urgent, CHIP_END_URGENT);
+    } else { /* no signals wait where all is sealed, and what is urgent is longer */
+        (void)isotp_listen(&end->receivers[0], (uint8_t *)end->signals, sizeof end->signals);
+    }
     (void)isotp_listen(&end->receivers[1], end->incoming, CHIP_END_ROOM);
 }
 
@@ -105,6 +112,20 @@ static void deliver(void *own, const struct link_entry *entry)
     end->calls.on_payload(end->calls.own, entry->payload, entry->length);
 }
 
+/* A frame of the link, which may be in a seal. */
+static bool take_frame(struct chip_end *end, const uint8_t *frame, uint32_t length, uint32_t now_ms)
+{
+    const bool has_room = end->calls.has_room == NULL || end->calls.has_room(end->calls.own);
+    if (end->calls.seal != NULL) {
+        length = end->calls.seal->open(end->calls.joint, frame, length, now_ms);
+        if (length == 0u) {
+            return true; /* the seal has counted it, or it was for the seal alone */
+        }
+        frame += CHIP_END_SEAL_HEAD;
+    }
+    return link_receive(&end->link, frame, length, now_ms, has_room ? deliver : NULL, end) == LINK_TAKEN;
+}
+
 /* A payload at a time: one that a more urgent one interrupts comes again by the link. */
 static void on_tunnel(struct chip_end *end, uint32_t priority, const uint8_t *data, uint8_t length, uint32_t now_ms)
 {
@@ -118,11 +139,7 @@ static void on_tunnel(struct chip_end *end, uint32_t priority, const uint8_t *da
     end->priorities[which] = (uint8_t)priority;
     answer = isotp_on_frame(receiver, data, length, now_ms);
     if (answer == ISOTP_WHOLE) {
-        const bool has_room = end->calls.has_room == NULL || end->calls.has_room(end->calls.own);
-        if (link_receive(&end->link, receiver->room, receiver->length, now_ms, has_room ? deliver : NULL, end) !=
-            LINK_TAKEN) {
-            end->wrong++;
-        }
+        end->wrong += take_frame(end, receiver->room, receiver->length, now_ms) ? 0u : 1u;
     } else if (answer != ISOTP_NOTHING) {
         end->wrong++;
     }
@@ -140,6 +157,8 @@ void chip_end_on_frame(struct chip_end *end, uint32_t identifier, const uint8_t 
         on_tunnel(end, identifier >> 26, data, length, now_ms);
     } else if (type == FLOW_CONTROL) {
         end->wrong += isotp_on_flow(&end->sender, data, length, now_ms) != ISOTP_NOTHING;
+    } else if (end->calls.seal != NULL) {
+        (void)end->calls.seal->open(end->calls.joint, NULL, 0u, now_ms); /* signals have no seal */
     } else {
         answer = native_hear(&end->native, identifier, data, length, &heard);
         end->wrong += answer < 0;
@@ -168,18 +187,51 @@ static uint8_t next_presence(struct chip_end *end, uint32_t *identifier, uint8_t
     return 8u;
 }
 
-/* Begins the next frame of the link, if one is due. */
-static void begin_next(struct chip_end *end, uint32_t now_ms)
+/* The next frame of the link, if one is due, into a room. */
+static uint32_t next_of_link(struct chip_end *end, uint8_t *room, uint32_t size, uint32_t now_ms)
 {
-    uint32_t length = link_next_numbered(&end->link, now_ms, end->outgoing, CHIP_END_ROOM);
+    uint8_t word[CHIP_END_WORD];
+    uint32_t length = end->calls.next_word == NULL ? 0u : end->calls.next_word(end->calls.own, word, sizeof word);
+    if (length > 0u) {
+        return link_best_effort(&end->link, word, length, room, size);
+    }
+    length = link_next_numbered(&end->link, now_ms, room, size);
     if (length == 0u) {
-        length = link_acknowledgement(&end->link, now_ms, end->outgoing, CHIP_END_ROOM);
+        length = link_acknowledgement(&end->link, now_ms, room, size);
     }
     if (length == 0u && now_ms - end->told_at_ms >= HEADER_EVERY_MS) {
-        length = link_tell(&end->link, end->outgoing, CHIP_END_ROOM);
+        length = link_tell(&end->link, room, size);
     }
+    return length;
+}
+
+/* The same in its seal, or what that has to say; nothing of the link goes before its session is proven. */
+static uint32_t next_sealed(struct chip_end *end, uint32_t now_ms)
+{
+    const struct chip_end_seal *const seal = end->calls.seal;
+    uint32_t length = seal->own_frame(end->calls.joint, end->outgoing, CHIP_END_ROOM, now_ms);
+    if (length > 0u || !seal->is_proven(end->calls.joint)) {
+        return length;
+    }
+    length = next_of_link(
+        end, &end->outgoing[CHIP_END_SEAL_HEAD], CHIP_END_ROOM - CHIP_END_SEAL_HEAD - SEAL_TAG, now_ms);
     if (length > 0u) {
         end->told_at_ms = now_ms;
+        length = seal->close(end->calls.joint, end->outgoing, length, CHIP_END_ROOM);
+    }
+    return length;
+}
+
+static void begin_next(struct chip_end *end, uint32_t now_ms)
+{
+    uint32_t length;
+    if (end->calls.seal != NULL) {
+        length = next_sealed(end, now_ms);
+    } else {
+        length = next_of_link(end, end->outgoing, CHIP_END_ROOM, now_ms);
+        end->told_at_ms = length > 0u ? now_ms : end->told_at_ms;
+    }
+    if (length > 0u) {
         isotp_begin(&end->sender, end->outgoing, length, end->largest, now_ms);
     }
 }
@@ -199,7 +251,7 @@ static uint8_t choose(struct chip_end *end, uint32_t *identifier, uint8_t data[I
             return ISOTP_FLOW_LENGTH;
         }
     }
-    length = next_signals(end, identifier, data);
+    length = end->calls.seal != NULL ? 0u : next_signals(end, identifier, data);
     if (length > 0u) {
         return length;
     }

@@ -13,10 +13,24 @@
 #ifndef CHIP_END_ROOM
 #define CHIP_END_ROOM 640u /* bytes of the largest frame of the link, each way */
 #endif
-#define CHIP_END_URGENT 128u
+#define CHIP_END_URGENT 232u /* an aiding as words */
 #define CHIP_END_SIGNALS 64u
 #define CHIP_END_WAITING 8u /* messages of signals that wait for the controller */
 #define CHIP_END_NOTHING 255u
+
+/* The seal of a joint: its frames have a head and a tag around those of the link. */
+#define CHIP_END_SEAL_HEAD 25u
+#define CHIP_END_WORD 384u /* bytes of a payload that may be lost */
+
+struct chip_end_seal {
+    /* length of the content, which begins behind the head; 0: it takes no effect */
+    uint32_t (*open)(void *joint, const uint8_t *frame, uint32_t length, uint32_t now_ms);
+    /* seals the content that lies behind the head; length of the frame */
+    uint32_t (*close)(void *joint, uint8_t *room, uint32_t length, uint32_t size);
+    /* what the seal itself has to say; 0 for nothing */
+    uint32_t (*own_frame)(void *joint, uint8_t *room, uint32_t size, uint32_t now_ms);
+    bool (*is_proven)(const void *joint);
+};
 
 /* Of a node, what the end calls. */
 struct chip_end_calls {
@@ -24,6 +38,11 @@ struct chip_end_calls {
     void (*on_payload)(void *own, const uint8_t *payload, uint32_t length);          /* by the link, once */
     void (*on_signals)(void *own, int type, const union native_message *heard);
     bool (*has_room)(void *own); /* for a payload; NULL: always. One for which there is none comes again */
+    /* The next payload that may be lost and is no signal; NULL: there are none */
+    uint32_t (*next_word)(void *own, uint8_t *room, uint32_t size);
+    link_close close_payload;         /* of payloads, by the link; NULL: there is none */
+    const struct chip_end_seal *seal; /* NULL: frames go as they are, and signals are believed */
+    void *joint;                      /* of the seal */
 };
 
 /* Signals that wait: a newer message of the same topic takes their place. */

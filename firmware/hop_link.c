@@ -185,10 +185,14 @@ enum link_answer link_receive(
     return LINK_TAKEN;
 }
 
-static uint32_t build(struct hop_link *link, const struct link_entry *entry, uint8_t *room, uint32_t size)
+static uint32_t build(struct hop_link *link, struct link_entry *entry, uint8_t *room, uint32_t size)
 {
     struct link_header header;
     uint32_t length;
+    if (entry != NULL) {
+        entry->head_length =
+            link->close == NULL ? 0u : link->close(link->close_own, entry->payload, entry->length, entry->head);
+    }
     header.sender = link->address;
     header.epoch = link->epoch;
     header.number = link->frames + 1u;

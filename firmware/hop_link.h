@@ -24,11 +24,18 @@ struct link_header {
     uint64_t mask; /* bit k: acknowledged + 1 + k has come too */
 };
 
+#define LINK_HEAD 27u /* bytes of a payload's own head */
+
 struct link_entry {
     uint64_t number;
     const uint8_t *payload;
     uint32_t length;
+    uint32_t head_length; /* what is written before the payload and belongs to it: a seal */
+    uint8_t head[LINK_HEAD];
 };
+
+/* Head of a payload as it leaves; its length, 0 for none. */
+typedef uint32_t (*link_close)(void *own, const uint8_t *payload, uint32_t length, uint8_t head[LINK_HEAD]);
 
 /* Where the next entry of a frame begins, and how many are left. */
 struct link_entries {
@@ -63,6 +70,8 @@ struct hop_link {
     bool was_heard;
     bool is_ack_due;
     struct link_slot slots[LINK_SLOTS];
+    link_close close; /* NULL: payloads leave as they are */
+    void *close_own;
 };
 
 enum link_answer {

@@ -161,13 +161,15 @@ static void put_array(struct written *to, uint32_t count)
 
 static void put_entry(struct written *to, const struct link_entry *entry)
 {
+    const uint32_t length = entry->head_length + entry->length;
     put_array(to, 2u);
     put_number(to, entry->number);
-    if (entry->length <= UINT8_MAX) {
-        put_form(to, 0xC4u, entry->length, 1u);
+    if (length <= UINT8_MAX) {
+        put_form(to, 0xC4u, length, 1u);
     } else {
-        put_form(to, 0xC5u, entry->length, 2u);
+        put_form(to, 0xC5u, length, 2u);
     }
+    put_bytes(to, entry->head, entry->head_length);
     put_bytes(to, entry->payload, entry->length);
 }
 

@@ -24,6 +24,12 @@ void pack_map(struct pack_writer *to, uint32_t count)
     put(to, 0x80u | count, 1u);
 }
 
+void pack_long_map(struct pack_writer *to, uint32_t count)
+{
+    put(to, 0xDEu, 1u);
+    put(to, count, 2u);
+}
+
 void pack_array(struct pack_writer *to, uint32_t count)
 {
     put(to, 0x90u | count, 1u);
@@ -90,15 +96,19 @@ void pack_bool(struct pack_writer *to, bool value)
     put(to, value ? 0xC3u : 0xC2u, 1u);
 }
 
-void pack_float(struct pack_writer *to, int64_t value, int32_t q)
+void pack_bits(struct pack_writer *to, uint64_t bits)
+{
+    put(to, 0xCBu, 1u);
+    put(to, bits, 8u);
+}
+
+uint64_t bits_of_quantity(int64_t value, int32_t q)
 {
     uint64_t magnitude = value < 0 ? (uint64_t)(-(value + 1)) + 1u : (uint64_t)value;
     const uint64_t sign = value < 0 ? UINT64_C(1) << 63 : 0u;
     int32_t exponent = 1023 + 52 - q;
-    put(to, 0xCBu, 1u);
     if (magnitude == 0u) {
-        put(to, 0u, 8u);
-        return;
+        return 0u;
     }
     while (magnitude < UINT64_C(1) << 52) {
         magnitude <<= 1;
@@ -112,7 +122,12 @@ void pack_float(struct pack_writer *to, int64_t value, int32_t q)
         magnitude = (magnitude >> 1) + ((magnitude & 3u) == 3u ? 1u : 0u);
         exponent++;
     }
-    put(to, sign | (((uint64_t)exponent << 52) + (magnitude - (UINT64_C(1) << 52))), 8u);
+    return sign | (((uint64_t)exponent << 52) + (magnitude - (UINT64_C(1) << 52)));
+}
+
+void pack_float(struct pack_writer *to, int64_t value, int32_t q)
+{
+    pack_bits(to, bits_of_quantity(value, q));
 }
 
 uint32_t packed_length(const struct pack_writer *to)
@@ -238,6 +253,22 @@ bool read_quantity(struct pack_reader *from, int32_t q, int64_t *value)
     }
     *value = whole * (INT64_C(1) << q);
     *from = ahead;
+    return true;
+}
+
+bool read_bits(struct pack_reader *from, uint64_t *bits)
+{
+    struct pack_reader ahead = *from;
+    uint64_t form;
+    int64_t whole;
+    if (take(&ahead, 1u, &form) && form == 0xCBu && take(&ahead, 8u, bits) && (*bits >> 52 & 0x7FFu) != 0x7FFu) {
+        *from = ahead;
+        return true;
+    }
+    if (!read_integer(from, &whole)) {
+        return false;
+    }
+    *bits = bits_of_quantity(whole, 0);
     return true;
 }
 

@@ -122,37 +122,56 @@ void seal_set_key(struct seal_key *key, const uint8_t secret[SEAL_KEY_SIZE])
     double_block(key->whole_last, key->cut_last);
 }
 
+void seal_add(const struct seal_key *key, struct seal_run *run, const uint8_t *part, size_t length)
+{
+    size_t k;
+    for (k = 0u; k < length; k++) {
+        if (run->held == SEAL_BLOCK) {
+            mix_in(run->tag, run->last);
+            encrypt(key, run->tag);
+            run->held = 0u;
+        }
+        run->last[run->held] = part[k];
+        run->held++;
+    }
+}
+
+void seal_end(const struct seal_key *key, struct seal_run *run, uint8_t tag[SEAL_BLOCK])
+{
+    const bool is_cut = run->held < SEAL_BLOCK;
+    if (is_cut) {
+        memset(&run->last[run->held], 0, SEAL_BLOCK - run->held);
+        run->last[run->held] = 0x80u;
+    }
+    mix_in(run->last, is_cut ? key->cut_last : key->whole_last);
+    mix_in(run->tag, run->last);
+    encrypt(key, run->tag);
+    memcpy(tag, run->tag, SEAL_BLOCK);
+}
+
 void seal_tag(const struct seal_key *key, const uint8_t *message, size_t length, uint8_t tag[SEAL_BLOCK])
 {
-    uint8_t last[SEAL_BLOCK] = {0u};
-    memset(tag, 0, SEAL_BLOCK);
-    while (length > SEAL_BLOCK) {
-        mix_in(tag, message);
-        encrypt(key, tag);
-        message += SEAL_BLOCK;
-        length -= SEAL_BLOCK;
+    struct seal_run run;
+    memset(&run, 0, sizeof run);
+    seal_add(key, &run, message, length);
+    seal_end(key, &run, tag);
+}
+
+bool seal_is_same(const uint8_t *tag, const uint8_t *other)
+{
+    unsigned apart = 0u;
+    unsigned k;
+    for (k = 0u; k < SEAL_TAG_SIZE; k++) {
+        apart |= (unsigned)tag[k] ^ other[k];
     }
-    if (length > 0u) {
-        memcpy(last, message, length);
-    }
-    if (length < SEAL_BLOCK) {
-        last[length] = 0x80u;
-    }
-    mix_in(last, length < SEAL_BLOCK ? key->cut_last : key->whole_last);
-    mix_in(tag, last);
-    encrypt(key, tag);
+    return apart == 0u;
 }
 
 bool seal_fits(const struct seal_key *key, const uint8_t *message, size_t length, const uint8_t tag[SEAL_TAG_SIZE])
 {
     uint8_t own[SEAL_BLOCK];
-    unsigned apart = 0u;
-    unsigned k;
     seal_tag(key, message, length, own);
-    for (k = 0u; k < SEAL_TAG_SIZE; k++) {
-        apart |= (unsigned)own[k] ^ tag[k];
-    }
-    return apart == 0u;
+    return seal_is_same(own, tag);
 }
 
 bool seal_admit(struct seal_window *window, uint32_t number)

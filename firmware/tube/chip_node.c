@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "borechain_orders.h"
+#include "chip_relays.h"
 #include "chip_signals.h"
 #include "chip_words.h"
 #include "msgpack.h"
@@ -58,45 +59,24 @@ static void on_lower_signals(void *own, int type, const union native_message *he
 
 /* Payloads */
 
-static bool pass_on(struct chip_node *node, enum node_side to, const uint8_t *payload, uint32_t length)
-{
-    uint32_t k;
-    for (k = 0u; k < NODE_RELAYS; k++) {
-        struct node_relay *const one = &node->relays[k];
-        if (one->length > 0u && link_holds(&node->ends[one->side].link, one->payload)) {
-            continue;
-        }
-        if (length > NODE_RELAY_ROOM) {
-            return false;
-        }
-        memcpy(one->payload, payload, length);
-        one->length = (uint16_t)length;
-        one->side = (uint8_t)to;
-        return link_send(&node->ends[to].link, one->payload, length);
-    }
-    return false;
-}
-
-static bool has_room(const struct chip_node *node, enum node_side to)
-{
-    uint32_t k;
-    for (k = 0u; k < NODE_RELAYS; k++) {
-        const struct node_relay *const one = &node->relays[k];
-        if (one->length == 0u || !link_holds(&node->ends[one->side].link, one->payload)) {
-            return node->ends[to].link.count < LINK_SLOTS;
-        }
-    }
-    return false;
-}
-
 static bool has_room_below(void *own)
 {
-    return has_room(own, NODE_LOWER);
+    return relay_has_room(own, NODE_LOWER);
 }
 
 static bool has_room_above(void *own)
 {
-    return has_room(own, NODE_UPPER);
+    return relay_has_room(own, NODE_UPPER);
+}
+
+static uint32_t words_up(void *own, uint8_t *room, uint32_t size)
+{
+    return said_next(own, NODE_UPPER, room, size);
+}
+
+static uint32_t words_down(void *own, uint8_t *room, uint32_t size)
+{
+    return said_next(own, NODE_LOWER, room, size);
 }
 
 static struct node_answer *answer_of(struct chip_node *node, int64_t order)
@@ -135,6 +115,9 @@ static void on_command(struct chip_node *node, const struct word_order *order)
 {
     struct node_answer *answer = answer_of(node, order->number);
     bool is_done;
+    if (answer == NULL && !seals_obey(node, order->number)) {
+        return;
+    }
     if (answer == NULL) {
         const char *const detail = obey(node, order, &is_done);
         answer = &node->kept.answers[node->kept.next_answer];
@@ -142,6 +125,7 @@ static void on_command(struct chip_node *node, const struct word_order *order)
             return; /* it comes again */
         }
         node->kept.next_answer = (node->kept.next_answer + 1u) % NODE_ANSWERS;
+        seals_answered(node, answer->length > 0u ? answer->order : 0);
         answer->order = order->number;
         answer->length = (uint8_t)word_reply(
             node->identity.tube, order->number, is_done, detail, answer->room, NODE_REPLY_ROOM);
@@ -156,21 +140,9 @@ static bool goes_down(int64_t kind)
     return kind == WORDS_RECEIPT || kind == WORDS_COMMAND || kind == BLOCK_SEGMENT || kind == SESSION_OFFER;
 }
 
-static void on_upper_payload(void *own, const uint8_t *payload, uint32_t length)
+static void on_own_payload(struct chip_node *node, int64_t kind, const uint8_t *payload, uint32_t length)
 {
-    struct chip_node *const node = own;
     struct word_order order;
-    int64_t kind = 0, target = 0;
-    if (!word_open(payload, length, &kind, &target)) {
-        return;
-    }
-    if (!goes_down(kind)) {
-        return; /* it is for one hop, and none that comes as a payload is read: never a yaw of another joint */
-    }
-    if (target != node->identity.tube) {
-        (void)pass_on(node, NODE_LOWER, payload, length);
-        return;
-    }
     if (kind == BLOCK_SEGMENT) {
         block_on_segment(node, payload, length);
         return;
@@ -186,12 +158,39 @@ static void on_upper_payload(void *own, const uint8_t *payload, uint32_t length)
     }
 }
 
+static void on_upper_payload(void *own, const uint8_t *payload, uint32_t length)
+{
+    struct chip_node *const node = own;
+    int64_t kind = 0, target = 0;
+    uint32_t content_length = length;
+    const uint8_t *const content = seals_content(node, payload, &content_length);
+    if (!word_open(content, content_length, &kind, &target)) {
+        return;
+    }
+    if (!goes_down(kind)) {
+        said_hear(node, NODE_UPPER, kind, content, content_length); /* for one hop */
+    } else if (target != node->identity.tube) {
+        (void)relay_pass(node, NODE_LOWER, payload, length);
+    } else if (seals_hear(node, payload, length, kind == SESSION_OFFER)) {
+        on_own_payload(node, kind, content, content_length);
+    }
+}
+
 static void on_lower_payload(void *own, const uint8_t *payload, uint32_t length)
 {
     struct chip_node *const node = own;
     int64_t kind = 0, target = 0;
-    if (word_open(payload, length, &kind, &target) && target == BASE && kind >= STATE && !goes_down(kind)) {
-        (void)pass_on(node, NODE_UPPER, payload, length);
+    uint32_t content_length = length;
+    const uint8_t *const content = seals_content(node, payload, &content_length);
+    if (!word_open(content, content_length, &kind, &target) || goes_down(kind)) {
+        return;
+    }
+    if (kind < STATE) {
+        said_hear(node, NODE_LOWER, kind, content, content_length);
+    } else if (target == BASE && kind == STATE) {
+        relay_pass_state(node, payload, length);
+    } else if (target == BASE) {
+        (void)relay_pass(node, NODE_UPPER, payload, length);
     }
 }
 
@@ -328,8 +327,8 @@ bool node_begin(
     uint32_t nonce,
     int64_t now_us)
 {
-    const struct chip_end_calls upper = {node, on_upper_payload, on_upper_signals, has_room_below};
-    const struct chip_end_calls lower = {node, on_lower_payload, on_lower_signals, has_room_above};
+    struct chip_end_calls upper = {node, on_upper_payload, on_upper_signals, has_room_below, words_up, NULL, NULL, NULL};
+    struct chip_end_calls lower = {node, on_lower_payload, on_lower_signals, has_room_above, words_down, NULL, NULL, NULL};
     memset(node, 0, sizeof *node);
     node->identity = *identity;
     node->flash = flash;
@@ -338,6 +337,11 @@ bool node_begin(
         return false;
     }
     node->kept.boots++;
+    if (!seals_begin(node, identity->key_page, identity->key_page_size, nonce)) {
+        return false;
+    }
+    seals_join(node, NODE_UPPER, &upper);
+    seals_join(node, NODE_LOWER, &lower);
     chip_end_begin(&node->ends[NODE_UPPER], &upper, identity->tube, node->kept.boots, ISOTP_FD, nonce, node_ms(now_us));
     chip_end_begin(
         &node->ends[NODE_LOWER], &lower, identity->tube, node->kept.boots, ISOTP_FD, nonce + 1u, node_ms(now_us));
@@ -368,6 +372,9 @@ static void follow_links(struct chip_node *node, uint32_t now_ms)
             node->has_neighbour[side] = false;
         }
     }
+    if (!node->has_neighbour[NODE_UPPER]) {
+        relay_drop_states(node);
+    }
 }
 
 void node_advance(struct chip_node *node, int64_t now_us)
@@ -384,6 +391,7 @@ void node_advance(struct chip_node *node, int64_t now_us)
         node->ask_at_ms = now_ms + (node->clock.exchanges < BURST ? QUICK_MS : SLOW_MS);
         signals_ask_time(node);
     }
+    seals_tell(node);
     if ((node->save_is_due && node->refused == 0u) || now_ms - node->saved_at_ms >= every) {
         memory_save(node, now_ms);
     }

@@ -12,6 +12,8 @@
 #include "chip_clock.h"
 #include "chip_end.h"
 #include "chip_mail.h"
+#include "chip_said.h"
+#include "chip_seals.h"
 #include "chip_words.h"
 #include "two_slots.h"
 
@@ -27,6 +29,8 @@ enum node_side { NODE_UPPER = 0, NODE_LOWER = 1 };
 struct node_identity {
     int64_t mount_var;   /* rad^2, Q56, of the IMU against the tube's marks */
     const uint8_t *block_key; /* BLOCK_KEY_SIZE bytes, of who may change its parameters; NULL: nobody */
+    const uint8_t *key_page;  /* keys of seals, see key_page.h; NULL: everybody is believed */
+    uint32_t key_page_size;
     uint8_t tube;
 };
 
@@ -51,6 +55,7 @@ struct chip_kept {
 struct node_relay {
     uint16_t length;
     uint8_t side;        /* of the link that has it */
+    bool is_state;       /* it may be lost, and waits until it leaves */
     uint8_t payload[NODE_RELAY_ROOM];
 };
 
@@ -73,6 +78,8 @@ struct chip_node {
     struct node_relay relays[NODE_RELAYS];
     struct node_surveyed surveyed;
     struct block_update update;
+    struct chip_seals seals;
+    struct chip_said said;
     struct slot_found found;
     const struct slot_board *flash;
     int64_t now_us;
@@ -89,7 +96,8 @@ struct chip_node {
     bool save_is_due;
 };
 
-/* From the image in its page of flash and from what was saved; false where the image is none of this program. */
+/* From the image in its page of flash and from what was saved; false where the image is none of this program, or a page of
+ * keys is not this tube's. */
 bool node_begin(
     struct chip_node *node,
     const uint8_t *image,

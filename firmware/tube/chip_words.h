@@ -15,7 +15,7 @@
 struct word_origin {
     int64_t number;
     int64_t rig_at;     /* s, Q28 */
-    uint16_t epoch;     /* 0: unknown */
+    uint32_t epoch;     /* 0: unknown */
     uint8_t tube;
 };
 

@@ -198,6 +198,6 @@ void state_of_node(const struct chip_node *node, int64_t now_us, struct borechai
     state->alignment_x = record->mount.method == 0 ? 0 : (int32_t)(record->mount.axis[0][0] * 1000000 >> 30);
     state->alignment_y = record->mount.method == 0 ? 0 : (int32_t)(record->mount.axis[0][1] * 1000000 >> 30);
     state->alignment_z = record->mount.method == 0 ? 0 : (int32_t)(record->mount.std[0][0] * 1000000 >> 40);
-    state->epoch = node->clock.told.epoch;
+    state->epoch = (uint16_t)node->clock.told.epoch;
     state->numbered = (uint32_t)(node->kept.mail.next_number - 1);
 }

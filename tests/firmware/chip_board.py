@@ -32,7 +32,7 @@ from telemetry.presentation.can_c_codec import NATIVE_CODE
 FIRMWARE = Path(__file__).parents[2] / "firmware"
 TUBE_SOURCES = FIRMWARE / "tube"
 FLASH_SIZE = 16 << 20  # of the emulator's memory that a file holds
-BOARD_AT, POWER_AT = 0x10000, 0x10010
+BOARD_AT, POWER_AT, KEYS_AT = 0x10000, 0x10010, 0x14000
 PATIENCE = 60.0
 MARK = b"\xb5"
 LINKED = ("-Wl,--gc-sections", "-DCHIP_END_ROOM=480u", "-nostartfiles", "--specs=nano.specs")
@@ -61,9 +61,11 @@ def sizes_of(program: Path) -> tuple[int, int]:
 
 
 class TubeFlash:
-    """The flash of a board, in a file that the emulator shares."""
+    """The flash of a board, in a file that the emulator shares; ``key_page`` is of its seals, where it has any."""
 
-    def __init__(self, path: Path, settings: TubeSettings, folder: Path, block_key: bytes = b"") -> None:
+    def __init__(
+        self, path: Path, settings: TubeSettings, folder: Path, block_key: bytes = b"", key_page: bytes = b""
+    ) -> None:
         self.path = path
         provision_node(settings, 1, folder)
         with path.open("wb") as file:
@@ -75,6 +77,8 @@ class TubeFlash:
             file.seek(BOARD_AT)
             mount_var = round(settings.mount_std**2 * 2.0**56)
             file.write(struct.pack("<IIqII32s", settings.tube, bool(block_key), mount_var, 0, 0, block_key))
+            file.seek(KEYS_AT)
+            file.write(key_page)
 
     def power_fails_after(self, words: int) -> None:
         """Let the power fail after so many more words of flash; 0: it holds."""

@@ -58,6 +58,7 @@ def load_node(folder: Path) -> ctypes.CDLL:
     library = ctypes.CDLL(str(folder / CHECKED_LIBRARY))
     library.shim_number.restype = ctypes.c_int64
     library.shim_key(None)
+    library.shim_page(b"", 0)
     library.shim_next.restype = ctypes.c_uint8
     return library
 

@@ -16,6 +16,8 @@ static long words_left = -1;
 static bool is_worn;
 static uint8_t block_key[BLOCK_KEY_SIZE];
 static bool has_key;
+static uint8_t key_page[9000];
+static uint32_t key_page_size;
 
 static void spend(void)
 {
@@ -64,6 +66,13 @@ void shim_key(const uint8_t *key)
     }
 }
 
+/* The page of keys of its seals; of no length: it has none. */
+void shim_page(const uint8_t *page, uint32_t size)
+{
+    key_page_size = size;
+    memcpy(key_page, page, size);
+}
+
 void shim_wear(int worn)
 {
     is_worn = worn != 0;
@@ -80,6 +89,8 @@ int shim_begin(const uint8_t *image, uint32_t size, uint8_t tube, int64_t mount_
     identity.tube = tube;
     identity.mount_var = mount_var;
     identity.block_key = has_key ? block_key : NULL;
+    identity.key_page = key_page_size > 0u ? key_page : NULL;
+    identity.key_page_size = key_page_size;
     if (setjmp(cut) != 0) {
         return -1;
     }
@@ -147,7 +158,7 @@ int64_t shim_number(int which)
     case 8:
         return node.update.untrusted;
     default:
-        return -1;
+        return which >= 100 ? (int64_t)node.seals.counts.count[which - 100] : -1;
     }
 }
 

@@ -26,7 +26,10 @@ class Header(ctypes.Structure):
 
 
 class Entry(ctypes.Structure):
-    _fields_ = [("number", ctypes.c_uint64), ("payload", ctypes.c_void_p), ("length", ctypes.c_uint32)]
+    _fields_ = [
+        ("number", ctypes.c_uint64), ("payload", ctypes.c_void_p), ("length", ctypes.c_uint32),
+        ("head_length", ctypes.c_uint32), ("head", ctypes.c_uint8 * 27),
+    ]  # fmt: skip
 
 
 class Entries(ctypes.Structure):
@@ -47,6 +50,7 @@ class State(ctypes.Structure):
         ("last_heard_ms", ctypes.c_uint32), ("ack_due_ms", ctypes.c_uint32), ("count", ctypes.c_uint32),
         ("session", ctypes.c_uint16), ("address", ctypes.c_uint8), ("has_peer", ctypes.c_bool),
         ("was_heard", ctypes.c_bool), ("is_ack_due", ctypes.c_bool), ("slots", Slot * SLOTS),
+        ("close", ctypes.c_void_p), ("close_own", ctypes.c_void_p),
     ]  # fmt: skip
 
 

@@ -40,6 +40,7 @@ class Calls(ctypes.Structure):
         ("on_payload", ON_PAYLOAD),
         ("on_signals", ON_SIGNALS),
         ("has_room", HAS_ROOM),
+        *((name, ctypes.c_void_p) for name in ("next_word", "close_payload", "seal", "joint")),
     ]
 
 

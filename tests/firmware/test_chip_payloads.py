@@ -32,7 +32,7 @@ pytestmark = needs_gcc
 
 class Origin(ctypes.Structure):
     _fields_ = [
-        ("number", ctypes.c_int64), ("rig_at", ctypes.c_int64), ("epoch", ctypes.c_uint16), ("tube", ctypes.c_uint8),
+        ("number", ctypes.c_int64), ("rig_at", ctypes.c_int64), ("epoch", ctypes.c_uint32), ("tube", ctypes.c_uint8),
     ]  # fmt: skip
 
 
@@ -87,7 +87,7 @@ def written(call: Any, *given: Any) -> Any:
     return message
 
 
-@pytest.mark.parametrize("epoch", [0, 1, 3, 65535])
+@pytest.mark.parametrize("epoch", [0, 1, 3, 65535, 65536, 2**32 - 1])
 def test_a_survey_has_every_number_in_its_unit_and_its_place(library: ctypes.CDLL, epoch: int) -> None:
     survey = Survey(
         round(3e-6 * 2**56), round(7e-6 * 2**56), round(12.25 * 2**28), 37, 0x60000000, 5, int(NodeFlag.RESTORED)

@@ -6,6 +6,7 @@ is one of rests and a turn, in the time of this machine.
 
 from __future__ import annotations
 
+import datetime
 import math
 import os
 import signal
@@ -20,26 +21,32 @@ from needed_programs import needs
 from own_clock_surface import Surface, living
 from rigs import free_endpoint, started
 
+from borechain.pki.rig_keys import add_tube, init_rig
 from node.firmware.tube_settings import TubeSettings
 from node.process.counter import BootCounter
+from node.process.key_page import write_key_page
 from sim.can.can_hub import CanHub, running_hub
 from sim.world.recording import fastest_at, record_sensors, yaw_error
 from sim.world.scenario import scenario_of
 from sim.world.world import World
+from telemetry.application.seals import Keys, Seals
 from telemetry.media.can_loopback import register_loopback
 from telemetry.media.zenoh_bus import open_router
 from telemetry.messages import (
+    BASE,
     BlockStatus,
     Command,
     Event,
     NodeFlag,
     NodeState,
     Reply,
+    Side,
     StaticRecord,
     SurveyMeasurement,
     UploadPhase,
 )
 from telemetry.parameters import ParameterBlock, SensorParameters
+from telemetry.transport.key_ring import key_file
 from telemetry.transport.upload import Upload, split_block
 
 RIG, CHIP, ABOVE, BELOW = "chip-between", 2, 3, 1
@@ -50,6 +57,7 @@ MINUTES = float(os.environ.get("BORECHAIN_CHIP_MINUTES", "2"))
 RATE_DPS = 71.0
 WORDS_UNTIL_CUT = 700  # of flash: within the content of a save
 FLASH, MEMORY = 192 * 1024, 32 * 1024
+NOW = datetime.datetime.now(datetime.UTC)
 BLOCK_KEY = bytes(range(32))
 BLOCK = ParameterBlock(CHIP, 1, accelerometer=SensorParameters(bias=(1e-3, 0.0, -1e-3)))  # its bias stays known
 pytestmark = [
@@ -80,13 +88,14 @@ def world_of(begin: float) -> World:
 class String:
     """Encoder, a tube in Python, the chip, another tube in Python; each joint a segment of CAN."""
 
-    def __init__(self, folder: Path, endpoint: str, hub: CanHub, program: Path) -> None:
-        self.folder, self.endpoint, self._hub, self._program = folder, endpoint, hub, program
+    def __init__(self, folder: Path, endpoint: str, hub: CanHub, program: Path, keys: Path | None) -> None:
+        self.folder, self.endpoint, self._hub, self._program, self._keys = folder, endpoint, hub, program, keys
         self.world = world_of(time.monotonic())
         record_sensors(self.world, folder)
         told = self.world.tube_settings(CHIP)
         own = TubeSettings(CHIP, drive_joint=told.drive_joint, lower_joint=told.lower_joint)
-        self.flash = TubeFlash(folder / "flash.bin", own, folder, BLOCK_KEY)
+        page = b"" if keys is None else write_key_page(keys, CHIP, folder).read_bytes()
+        self.flash = TubeFlash(folder / "flash.bin", own, folder, BLOCK_KEY, page)
         self.running: dict[str, Forked] = {}
         self._chip: EmulatedTube | None = None
 
@@ -95,10 +104,14 @@ class String:
 
     def start(self, name: str, *options: str) -> None:
         place = ("--endpoint", self.endpoint, "--folder", str(self.folder / name))
-        self.running[name] = started(name.split("-", maxsplit=1)[0], "--clock", "own", "--rig", RIG, *options, *place)
+        under = () if self._keys is None else ("--keys", str(self._keys))
+        self.running[name] = started(
+            name.split("-", maxsplit=1)[0], "--clock", "own", "--rig", RIG, *options, *place, *under
+        )
 
     def start_all(self) -> None:
-        BootCounter(self.folder / "encoder")  # one that has started before: its epoch is a small number
+        if self._keys is None:
+            BootCounter(self.folder / "encoder")  # one that has started before: its epoch is one that a signal can say
         counter = f"timed:{self.folder / 'encoder.npy'}"
         self.start("encoder", "--counter", counter, "--above", "base", "--lower", self.joint("encoder", str(ABOVE)))
         for tube, joints in (
@@ -136,12 +149,22 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build_tube(tmp_path_factory.mktemp("tube"))
 
 
-@pytest.fixture
-def surface_and_string(tmp_path: Path, program: Path) -> Iterator[tuple[Surface, String]]:
+@pytest.fixture(params=["open", "sealed"])
+def surface_and_string(
+    request: pytest.FixtureRequest, tmp_path: Path, program: Path
+) -> Iterator[tuple[Surface, String]]:
+    """Without keys and an epoch that signals can say, and under keys with an epoch that they cannot."""
     register_loopback()
-    endpoint = free_endpoint()
-    with open_router(endpoint) as bus, running_hub() as hub, living(Surface(receipts=RECEIPTS), bus, RIG) as surface:
-        string = String(tmp_path, endpoint, hub, program)
+    endpoint, keys, seals = free_endpoint(), None, None
+    if request.param == "sealed":
+        keys = tmp_path / "keys"
+        init_rig(keys, RIG, NOW)
+        for tube in (BELOW, CHIP, ABOVE):
+            add_tube(keys, tube, NOW)
+        seals = Seals(Keys(key_file(keys, BASE), BASE), BASE, {Side.LOWER})
+    base = Surface(seals, RECEIPTS)
+    with open_router(endpoint) as bus, running_hub() as hub, living(base, bus, RIG) as surface:
+        string = String(tmp_path, endpoint, hub, program, keys)
         string.start_all()
         try:
             yield surface, string

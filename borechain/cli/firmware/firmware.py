@@ -67,9 +67,15 @@ def build(target: str, imus: int, out: Path) -> None:
 @click.option(
     "--room", type=click.IntRange(1, 8), default=8, show_default=True, help="IMUs that the chip's program has room for."
 )
+@click.option(
+    "--keys",
+    "keys_place",
+    type=click.Path(path_type=Path, exists=True),
+    help="Keys that borechain pki made: the tube's file, or the folder that it lies in; a page of them for the flash.",
+)
 @out_option
 @plain_faults
-def provision(request: TubeRequest, room: int, out: Path) -> None:
+def provision(request: TubeRequest, room: int, keys_place: Path | None, out: Path) -> None:
     """Write what a tube's chip begins with, as an image for a page of its flash, and the header that loads it.
 
     The options are those of `borechain node`, and --room is the --imus of `borechain firmware build`.
@@ -78,13 +84,16 @@ def provision(request: TubeRequest, room: int, out: Path) -> None:
     Examples:
       borechain firmware provision --tube 3 --drive-joint-deg 12.5 --lower-joint-deg 4.0 --out tube-3
       borechain firmware provision --tube 3 --imu-gyroscope gyroscope.json --room 1 --out tube-3
+      borechain firmware provision --tube 3 --keys stick --out tube-3
     """
     from node.firmware.node_image import provision_node
+    from node.process.key_page import write_key_page
 
     settings = request.to_settings()
     make_folder(out)
     made = provision_node(settings, room, out)
-    for path in made.files:
+    pages = [] if keys_place is None else [write_key_page(keys_place, settings.tube, out)]
+    for path in (*made.files, *pages):
         click.echo(path)
     click.echo(f"tube {settings.tube}, source {made.digest}, {made.size} bytes")
 

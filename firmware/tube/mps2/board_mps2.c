@@ -34,6 +34,9 @@
 #define SLOT_SIZE 0x4000u
 #define BOARD (FLASH + 0x10000u)             /* tube, whether it has a key, variance of the mount (two words), words of
                                                 flash before power fails, a word of nothing, the key of its blocks */
+#define KEYS (FLASH + 0x14000u)              /* a page of keys, where joints are sealed */
+#define KEYS_SIZE 0x4000u
+#define KEYS_MAGIC 0x594B4342u               /* "BCKY" */
 #define POWER REGISTER(BOARD + 16u)          /* 0: it does not fail */
 #define OPEN_EVERY_MS 500u
 #define SENSOR 2u
@@ -265,6 +268,8 @@ int main(void)
     begin_board();
     identity.tube = (uint8_t)REGISTER(BOARD);
     identity.block_key = REGISTER(BOARD + 4u) != 0u ? (const uint8_t *)(BOARD + 24u) : NULL;
+    identity.key_page = REGISTER(KEYS) == KEYS_MAGIC ? (const uint8_t *)KEYS : NULL;
+    identity.key_page_size = KEYS_SIZE;
     memcpy(&identity.mount_var, (const uint8_t *)(BOARD + 8u), sizeof identity.mount_var);
     is_known = node_begin(&node, (const uint8_t *)FLASH, IMAGE_SIZE, &identity, &flash, 0xB0CE0000u, now_us());
     while (is_known) {
