@@ -52,6 +52,8 @@ def test_a_hole_without_its_zeros_is_that_with_them(stops: int, monkeypatch: pyt
     without, whole = found
     assert without.solution.sparse is not None
     assert whole.solution.sparse is None
+    information = without.solution.in_common.information  # of both triangles of which shares of positions are made
+    np.testing.assert_array_equal(information, information.T)
     stds = np.sqrt(np.diagonal(whole.covs, axis1=1, axis2=2))
     apart = np.einsum("kai,ki->ka", whole.bases, without.now.tangents - whole.now.tangents)
     assert np.abs(apart / stds[:, :2]).max() < 1e-5
