@@ -235,14 +235,14 @@ def test_a_fault_of_a_joint_is_told_when_it_has_grown_and_a_minute_has_passed() 
 
 def test_an_end_is_missed_after_its_limit_and_once_until_it_is_heard() -> None:
     watch = AbsenceWatch((Side.UPPER, Side.LOWER), 100.0)
-    nobody: dict[Side, object] = {Side.UPPER: None}
-    assert watch.find(nobody, 159.999) == []
+    silent: dict[Side, object] = {Side.UPPER: None}
+    assert watch.find(silent, 159.999) == []
     assert watch.find({Side.UPPER: "heard"}, 160.0) == [Side.LOWER]
-    assert watch.find(nobody, 219.999) == []
-    assert watch.find(nobody, 220.0) == [Side.UPPER]
-    assert watch.find(nobody, 300.0) == []
+    assert watch.find(silent, 219.999) == []
+    assert watch.find(silent, 220.0) == [Side.UPPER]
+    assert watch.find(silent, 300.0) == []
     assert watch.find({Side.LOWER: "heard", Side.UPPER: None}, 301.0) == []
-    assert watch.find(nobody, 361.0) == [Side.LOWER]
+    assert watch.find(silent, 361.0) == [Side.LOWER]
 
 
 def test_deadlines_are_a_grid_and_those_that_passed_are_left_out() -> None:
