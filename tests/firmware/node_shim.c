@@ -157,6 +157,8 @@ int64_t shim_number(int which)
         return node.kept.block.version;
     case 8:
         return node.update.untrusted;
+    case 9:
+        return node.kept.next_answer;
     default:
         return which >= 100 ? (int64_t)node.seals.counts.count[which - 100] : -1;
     }
