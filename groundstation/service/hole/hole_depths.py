@@ -8,13 +8,18 @@ from dataclasses import replace
 from groundstation.config import GroundConfig
 from groundstation.service.hole.resolved_stops import ResolvedStops
 from groundstation.service.hole.station import SurveyStation
-from groundstation.service.hole.told_depths import depths_at_make_ups
+from groundstation.service.hole.told_depths import NO_MAKE_UPS, depths_at_make_ups
 from groundstation.service.setup.setup_book import SetupBook
 from groundstation.service.setup.setup_priors import depth_errors, length_stds
 from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.well.depth_errors import DepthErrors, StationDepth, mean_depth
-from groundstation.survey.well.make_up_depths import learnt_reading_std, misfit_of_depths
+from groundstation.survey.well.make_up_depths import (
+    MakeUpDepths,
+    learnt_reading_std,
+    misfit_of_depths,
+    usual_reading_std,
+)
 
 
 class HoleDepths:
@@ -31,7 +36,7 @@ class HoleDepths:
         self._config, self._setup, self._shared, self._stops = config, setup, shared, stops
         self._told = depth_errors(config, setup)
         self._misfit: tuple[int, float, str] = (0, 0.0, "")  # by version and since when
-        self._learnt = 0, self._told  # by version
+        self._make_ups = 0, NO_MAKE_UPS  # by version
         self._columns: dict[float, tuple[tuple[int, ...], Packed]] = {}  # by depth (m) of a station, and of what
 
     def misfit(self, version: int, since: float) -> str:
@@ -57,7 +62,7 @@ class HoleDepths:
         learns : how depths scatter at make-ups is taken in; that is another thing at every stop, so where all stations
             are worked out anew
         """
-        errors = self.learnt(version) if learns else self._told
+        errors = self._learnt(version) if learns else self._told
         stds = length_stds(self._setup) if self._setup.lengths else {}
         told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()} if stds else {}
         found, places_of = {}, self._stops.depth_places.__getitem__
@@ -72,16 +77,21 @@ class HoleDepths:
         return found
 
     def scatter(self, version: int) -> float:
-        """Variance (m^2) of each reading of the depth that the make-ups show beyond what is stated of it.
+        """Variance (m^2) of each reading of the depth that most make-ups show beyond what is stated of it.
 
         What is stated, some millimetres, bends no hole by anything.
         """
-        return self.learnt(version).reading_std ** 2 - self._told.reading_std**2
+        usual = usual_reading_std(self._at_make_ups(version), self._told, self._config.tube_length)
+        return usual**2 - self._told.reading_std**2
 
-    def learnt(self, version: int) -> DepthErrors:
-        """Errors of measured depths, as far as they scatter at make-ups; worked out once for each version."""
-        if self._learnt[0] != version:
+    def _learnt(self, version: int) -> DepthErrors:
+        """Errors of measured depths, as far as they scatter at make-ups."""
+        std = learnt_reading_std(self._at_make_ups(version), self._told, self._config.tube_length)
+        return replace(self._told, reading_std=std)
+
+    def _at_make_ups(self, version: int) -> MakeUpDepths:
+        """Depths at make-ups; they are looked up once for each version of the hole."""
+        if self._make_ups[0] != version:
             found = depths_at_make_ups(self._stops, self._shared, self._config, self._setup)
-            std = learnt_reading_std(found, self._told, self._config.tube_length)
-            self._learnt = version, replace(self._told, reading_std=std)
-        return self._learnt[1]
+            self._make_ups = version, found
+        return self._make_ups[1]

@@ -12,7 +12,7 @@ from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.well.make_up_depths import MakeUpDepths, make_up_depths
 
 Array = npt.NDArray[np.float64]
-NOTHING = MakeUpDepths(np.zeros(0, np.intp), np.zeros(0), np.zeros(0))
+NO_MAKE_UPS = MakeUpDepths(np.zeros(0, np.intp), np.zeros(0), np.zeros(0))
 
 
 def depths_at_make_ups(
@@ -28,7 +28,7 @@ def depths_at_make_ups(
     is_at_bit = np.array(stops.below) == 0
     rows = np.flatnonzero(is_at_bit & (table["hops"] > 0) & (table["md"] > 0.0) & (table["at"] > since))
     if not len(rows):
-        return NOTHING
+        return NO_MAKE_UPS
     longest = table["chain"][rows[np.argmax(table["hops"][rows])]].item()
     tube, above = shared.chain(longest)
     tubes = np.asarray(table["hops"][rows], np.intp)

@@ -90,6 +90,16 @@ def learnt_reading_std(found: MakeUpDepths, errors: DepthErrors, tube_length: fl
     return max(errors.reading_std, math.sqrt(var))
 
 
+def usual_reading_std(found: MakeUpDepths, errors: DepthErrors, tube_length: float) -> float:
+    """The same by the median of the steps: one depth that jumped or stood still is no scatter."""
+    if not found.is_at_make_ups(tube_length):
+        return errors.reading_std
+    steps = found.steps
+    usual_var = 0.5 * (OF_MEDIAN * float(np.median(np.abs(steps)))) ** 2
+    var = (KNOWN_AS * errors.reading_std**2 + len(steps) * usual_var) / (KNOWN_AS + len(steps))
+    return max(errors.reading_std, math.sqrt(var))
+
+
 def misfit_of_depths(found: MakeUpDepths, errors: DepthErrors, tube_length: float) -> str:
     """Why the depths do not fit the tubes, in words, or nothing.
 

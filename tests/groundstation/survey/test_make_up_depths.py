@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -14,6 +16,7 @@ from groundstation.survey.well.make_up_depths import (
     learnt_reading_std,
     make_up_depths,
     misfit_of_depths,
+    usual_reading_std,
 )
 
 LENGTH = 2.0
@@ -77,7 +80,26 @@ def test_readings_that_scatter_are_known_less_well(seed: int, std: float) -> Non
     assert learnt_reading_std(depths(rest), ERRORS, LENGTH) == pytest.approx(std, rel=0.7)
 
 
+@given(seed=st.integers(0, 2**32 - 1), std=st.sampled_from([0.02, 0.05, 0.1]))
+def test_most_readings_tell_how_far_they_scatter(seed: int, std: float) -> None:
+    rest = np.random.default_rng(seed).normal(0.0, std, 200)
+    assert usual_reading_std(depths(rest), ERRORS, LENGTH) == pytest.approx(std, rel=0.35)
+
+
+def test_a_depth_that_jumped_once_is_no_scatter() -> None:
+    """Nine steps of 6 mm by their size, beside the 2 mm that are stated and count for four."""
+    rest = 0.006 * np.array([0, 1, 0, 1, 0, 1, 0, 1, 0, 1.0])
+    expected = math.sqrt((4.0 * 0.002**2 + 9.0 * (1.4826 * 0.006) ** 2 / 2.0) / 13.0)
+    for jump in (0.0, 0.15, 2.0):
+        assert usual_reading_std(depths(rest + np.repeat([0.0, jump], 5)), ERRORS, LENGTH) == pytest.approx(expected)
+    assert learnt_reading_std(depths(rest + np.repeat([0.0, 2.0], 5)), ERRORS, LENGTH) > 0.3
+    assert usual_reading_std(depths(np.zeros(6)), ERRORS, LENGTH) == ERRORS.reading_std
+    anywhere = -LENGTH * np.random.default_rng(3).random(20)
+    assert usual_reading_std(depths(anywhere), ERRORS, LENGTH) == ERRORS.reading_std
+
+
 def test_nothing_is_said_of_nothing() -> None:
     nothing = MakeUpDepths(np.zeros(0, np.intp), np.zeros(0), np.zeros(0))
     assert misfit_of_depths(nothing, ERRORS, LENGTH) == ""
     assert learnt_reading_std(nothing, ERRORS, LENGTH) == ERRORS.reading_std
+    assert usual_reading_std(nothing, ERRORS, LENGTH) == ERRORS.reading_std
