@@ -187,6 +187,17 @@ def test_a_twist_that_came_since_counts() -> None:
     assert surveyed.node["revision"]["systematic"] == 0.5
 
 
+def test_what_the_same_rest_contradicts_is_held_against_neither() -> None:
+    surveyed = Surveyed()
+    surveyed.state["systematic_var"] = surveyed.node["guard"]["ramp"]["doubt"] = 4.0
+    assert surveyed.follows(0.4)
+    assert surveyed.node["revision"]["systematic"] == 4.0
+    surveyed = Surveyed()
+    surveyed.state["still_cycles"] = 0  # the string turns: the doubt may be of what came since
+    surveyed.state["systematic_var"] = surveyed.node["guard"]["ramp"]["doubt"] = 4.0
+    assert not surveyed.follows(0.4)
+
+
 def test_only_the_encoders_measurement_is_smoothed() -> None:
     surveyed = Surveyed()
     surveyed.settings["scheme"] = 1

@@ -56,7 +56,8 @@ def follow_revision(node: Any, status: int) -> bool:
         return False
     is_last = is_over(node, status)
     judged = state.rejected == 0 and (node.guard.ramp.left == 0 or is_last)
-    worth = judged and is_worth(state, revision, is_last)
+    found = node.guard.ramp.doubt if revision.turned == 0 else 0
+    worth = judged and is_worth(state, revision, found, is_last)
     if worth:
         revision.systematic = max(revision.systematic, state.systematic_var)
         revision.said_var = state.surveyed_var
@@ -78,8 +79,12 @@ def is_over(node: Any, status: int) -> bool:
 
 
 @kernel
-def is_worth(state: Any, revision: Any, is_last: bool) -> bool:
-    """Whether the yaw of the survey is known so much better; a twist that came since is in all that tells of it."""
+def is_worth(state: Any, revision: Any, found: float, is_last: bool) -> bool:
+    """Whether the yaw of the survey is known so much better; a twist that came since is in all that tells of it.
+
+    What ``found`` (rad^2) an aiding of the same rest contradicts the turn to it by was as wrong when the survey was
+    said, so it is held against neither.
+    """
     limit = times_factor(revision.said_var, WORTH_LAST) if is_last else half_of(revision.said_var)
-    var = state.surveyed_var
-    return bool(var < limit and var + state.systematic_var < revision.said_var + revision.systematic)
+    var, came = state.surveyed_var, max(state.systematic_var - found, 0)
+    return bool(var < limit and var + came < revision.said_var + revision.systematic)
