@@ -144,7 +144,7 @@ static void speak(uint32_t now)
 
 int main(void)
 {
-    const struct chip_end_calls calls = {NULL, on_payload, on_signals, NULL};
+    const struct chip_end_calls calls = {NULL, on_payload, on_signals, NULL, NULL, NULL, NULL, NULL};
     uint32_t hello_at_ms = 0u;
     UART_DIVISOR = 16u;
     UART_CONTROL = 3u;
