@@ -82,7 +82,7 @@ RIG_STUDIES: Final = by_name(
             ),
             counts="rigs",
             drawn=False,
-            full=("--seeds 4 --honest 264",),
+            full=("--seeds 9 --honest 1000",),
             short="--seeds 1 --honest 1",
         ),
     ],
