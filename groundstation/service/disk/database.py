@@ -120,7 +120,7 @@ class Database:
             self._engine.dispose()  # a file that was opened while it could not be written stays so
             raise
         self.refusal = ""
-        if self._guarded is not None:
+        if self._guarded is not None and self._guarded.is_generation_due():
             with self._refusing():
                 self._guarded.follow_journal(self._engine)
 

@@ -43,6 +43,7 @@ class GuardedFile:
 
     def __init__(self, file: Path, disk: Disk) -> None:
         self.file, self._disk = file, disk
+        self._journal_file = journal_of(file)
         self.parted = ""
         self._generation = JournalGeneration()
         self._guard: sqlite3.Connection | None = None
@@ -54,7 +55,7 @@ class GuardedFile:
 
     def part_foreign_journal(self) -> None:
         """Give a journal another name that lies beside the file and was begun on another one."""
-        journal = journal_of(self.file)
+        journal = self._journal_file
         if self._disk.identity(self.file) and self._disk.identity(journal):
             with contextlib.suppress(OSError):  # without room for a look the journal is read, as is usual
                 if self._is_first() and is_of_another(self.file):
@@ -104,14 +105,16 @@ class GuardedFile:
             self._stamp = found
         return True
 
+    def is_generation_due(self) -> bool:
+        """Whether the journal has grown long, or is another since connections were opened anew."""
+        journal = self._disk.stamp(self._journal_file)
+        return bool(journal) and (self._guard is None or journal[:1] != self._journal or journal[1] > self._limit)
+
     def follow_journal(self, engine: sa.Engine) -> None:
-        """Begin a generation where the journal has grown long, or is another since connections were opened anew.
+        """Begin the generation that is due.
 
         A file that could not be guarded at the start, as on a disk that refused, is from now on.
         """
-        journal = self._disk.stamp(journal_of(self.file))
-        if not journal or (self._guard is not None and journal[:1] == self._journal and journal[1] <= self._limit):
-            return
         if self._guard is None:
             self.begin(engine)
         else:
@@ -121,11 +124,11 @@ class GuardedFile:
     def note_stamps(self) -> None:
         """Remember how the file was left, and which journal is beside it."""
         self._stamp = self._disk.stamp(self.file)
-        self._journal = self._disk.stamp(journal_of(self.file))[:1]
+        self._journal = self._disk.stamp(self._journal_file)[:1]
 
     def part_own_journal(self) -> None:
         """Give our journal another name: SQLite would read it into whatever file has the name of ours."""
-        journal = journal_of(self.file)
+        journal = self._journal_file
         if self._journal and self._disk.stamp(journal)[:1] == self._journal:
             self._part(journal)
 
@@ -174,7 +177,7 @@ class GuardedFile:
             busy, *_ = connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)").one()
             connection.exec_driver_sql(f"PRAGMA busy_timeout={patience}")
         self._enter(engine, fresh if busy else JournalGeneration(fresh.own))
-        size = self._disk.stamp(journal_of(self.file))[1]
+        size = self._disk.stamp(self._journal_file)[1]
         self._limit = JOURNAL_LIMIT + (size if busy else 0)
 
     def _enter(self, engine: sa.Engine, generation: JournalGeneration) -> None:

@@ -32,15 +32,15 @@ class Packed:
     def __init__(self, columns: Array, places: Places | None = None) -> None:
         """``places`` of those that are not zero, where they are known."""
         at = np.nonzero(columns.any(axis=0))[0] if places is None else places
-        self.places = as_places(at, columns.shape[1])
         self.values: Array = columns.take(at, axis=1)
         self.width = int(columns.shape[1])
+        self.places = at.astype(np.uint16 if self.width <= MOST_OF_16_BITS else np.intp, copy=False)
 
     @classmethod
     def of_values(cls, values: Array, places: Places, width: int) -> Packed:
         """Columns of which ``values`` (k, c) stand at ``places`` (c,), of ``width``."""
         made = cls.__new__(cls)
-        made.places = as_places(places, width)
+        made.places = places.astype(np.uint16 if width <= MOST_OF_16_BITS else np.intp, copy=False)
         made.values, made.width = values, width
         return made
 

@@ -85,7 +85,7 @@ class Trajectory:
 
     def __len__(self) -> int:
         """Number of points."""
-        return len(self._stations)
+        return len(self._stations.depths)
 
     def __getitem__(self, place: int) -> TrajectoryPoint:
         place = range(len(self))[place]
@@ -102,44 +102,44 @@ class Trajectory:
     @property
     def md(self) -> Array:
         """Depths (n,) of the points, m."""
-        return np.asarray(self._stations.rows["md"][: len(self._stations)])
+        return np.asarray(self._stations.rows["md"][: len(self._stations.depths)])
 
     @property
     def tangent_covs(self) -> Array:
         """Covariances (n, 3, 3) of the directions, of each the part that no other shares."""
-        return np.asarray(self._stations.rows["own"][: len(self._stations)])
+        return np.asarray(self._stations.rows["own"][: len(self._stations.depths)])
 
     @property
     def positions(self) -> Array:
         """Positions (n, 3) of the points, m."""
-        return np.asarray(self._stations.rows["position"][: len(self._stations)])
+        return np.asarray(self._stations.rows["position"][: len(self._stations.depths)])
 
     @property
     def tangents(self) -> Array:
         """Tangents (n, 3) at the points."""
-        return np.asarray(self._stations.rows["tangent"][: len(self._stations)])
+        return np.asarray(self._stations.rows["tangent"][: len(self._stations.depths)])
 
     @property
     def covs(self) -> Array:
         """Covariances (n, 3, 3) of the positions, m^2."""
-        return np.asarray(self._stations.rows["cov"][: len(self._stations)])
+        return np.asarray(self._stations.rows["cov"][: len(self._stations.depths)])
 
     @property
     def path_covs(self) -> Array:
         """Covariances (n, 3, 3), m^2, that the path between the stations makes of ``covs``."""
-        return np.asarray(self._stations.rows["path"][: len(self._stations)])
+        return np.asarray(self._stations.rows["path"][: len(self._stations.depths)])
 
     @property
     def depth_covs(self) -> Array:
         """Covariances (n, 3, 3), m^2, that the own errors of depths make of ``covs``; what they share has columns."""
-        rows = self._stations.rows[: len(self._stations)]
+        rows = self._stations.rows[: len(self._stations.depths)]
         along = rows["along"]
         return np.asarray(rows["kinks"] + rows["depth_var"][:, None, None] * (along[:, :, None] * along[:, None]))
 
     @property
     def turned_back(self) -> list[float]:
         """Depths (m) of the stations that point back against the one above: the hole is not what is drawn there."""
-        tangents = self._stations.rows["tangent"][: len(self._stations)]
+        tangents = self._stations.rows["tangent"][: len(self._stations.depths)]
         return [float(md) for md in self.md[1:][(tangents[:-1] * tangents[1:]).sum(axis=1) < TURNED_BACK]]
 
     def append(self, md: float, direction: Direction, depth: StationDepth = EXACT) -> TrajectoryPoint:
@@ -196,7 +196,7 @@ class Trajectory:
         SurveyError
             When a depth is not below the first; then none is put.
         """
-        changed, collar, known = list[int](), float(self._stations.rows["md"][0]), len(self._stations)
+        changed, collar, known = list[int](), float(self._stations.rows["md"][0]), len(self._stations.depths)
         stations = sorted(stations, key=itemgetter(0))
         for md, _ in stations:
             if not collar < md < math.inf:
@@ -204,13 +204,15 @@ class Trajectory:
         if stations and stations[0][0] > self._stations.rows["md"][known - 1]:
             self._stations.append_all(stations, depths)
             changed, stations = list(range(known, len(self))), []
+        directions = self._stations.directions if stations else []
         for md, direction in stations:
-            place = int(np.searchsorted(self.md, md))
-            if place == len(self._stations) or self._stations.rows["md"][place] != md:
+            count = len(self._stations.depths)
+            place = int(np.searchsorted(self._stations.rows["md"][:count], md))
+            if place == count or self._stations.rows["md"][place] != md:
                 self._stations.insert(place, md, direction)
-            elif self._stations.directions[place] is direction:
+            elif directions[place] is direction:
                 continue
-            self._stations.directions[place] = direction
+            directions[place] = direction
             self._stations.depths[place] = depths.get(md, self._stations.depths[place])
             changed.append(place)
         self._stations.direct(changed)
@@ -353,7 +355,7 @@ class Trajectory:
             begin -= begin % BLOCK
             del self._kept[begin + 1 :], self._marks[begin // BLOCK + 1 :]
             self._sums = self._marks[-1]
-        end = len(self._stations)
+        end = len(self._stations.depths)
         rows = self._stations.rows[begin:end]
         legs = leg_displacements(self.method, rows["md"], rows["tangent"])
         more = self._go_along(begin, rows, legs)

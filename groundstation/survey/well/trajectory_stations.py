@@ -49,21 +49,23 @@ class TrajectoryStations:
         self._run: DirectionRun | None = None
         self._depths_share = False  # whether any depth ever had columns
 
-    def __len__(self) -> int:
-        return len(self.depths)
-
     @property
     def directions(self) -> list[Direction]:
         """Of each, one by one."""
-        run, self._run = self._run, None
-        for direction in run or ():
+        if self._run is not None:
+            self._part_run(self._run)
+        return self._single
+
+    def _part_run(self, run: DirectionRun) -> None:
+        """Have those that are side by side one by one."""
+        self._run = None
+        for direction in run:
             self._single.append(direction)
             self._columns.append(direction.packed)
-        return self._single
 
     def insert(self, place: int, md: float, direction: Direction) -> None:
         """Insert a row for a station; what follows from its direction is not in it yet."""
-        directions, known, count = self.directions, self.rows, len(self)
+        directions, known, count = self.directions, self.rows, len(self.depths)
         if count == len(known):
             self.rows = np.zeros(count + 1 + count // GROWTH, ROW)
             self.rows[:count] = known
@@ -75,16 +77,17 @@ class TrajectoryStations:
 
     def append_all(self, stations: Sequence[tuple[float, Direction]], depths: Mapping[float, StationDepth]) -> None:
         """Append stations (m, direction) in their order; a depth that is not told is exact."""
-        directions = self.directions
+        if self._run is not None:
+            self._part_run(self._run)
         self._append_depths([md for md, _ in stations], depths)
-        directions += [direction for _, direction in stations]
+        self._single += [direction for _, direction in stations]
         self._columns += [NONE] * len(stations)
 
     def append_run(self, mds: Sequence[float], run: DirectionRun, depths: Mapping[float, StationDepth]) -> None:
         """Append stations (m) side by side, with what depends on their own direction alone; see ``append_all``."""
-        self._single, begin = self.directions, len(self)
+        self._single, begin = self.directions, len(self.depths)
         self._append_depths(mds, depths)
-        self._run, rows = run, self.rows[begin : len(self)]
+        self._run, rows = run, self.rows[begin : len(self.depths)]
         rows["tangent"], rows["own"], rows["count"] = run.tangents, run.owns, len(run.places)
         rows["depth_var"] = [depth.own_var for depth in self.depths[begin:]]
         by_depth = [depth.columns for depth in self.depths[begin:]]
@@ -95,7 +98,7 @@ class TrajectoryStations:
 
     def _append_depths(self, mds: Sequence[float], depths: Mapping[float, StationDepth]) -> None:
         """Append rows of stations (m) with their depths."""
-        count, more = len(self), len(mds)
+        count, more = len(self.depths), len(mds)
         if count + more > len(self.rows):
             known, self.rows = self.rows[:count], np.zeros(count + more + count // GROWTH, ROW)
             self.rows[:count] = known
@@ -112,8 +115,9 @@ class TrajectoryStations:
         """
         if not places:
             return
-        all_directions = self.directions
-        directions = [*map(all_directions.__getitem__, places)]
+        if self._run is not None:
+            self._part_run(self._run)
+        directions = [*map(self._single.__getitem__, places)]
         if tangents is None:
             tangents = tangents_of(directions)
         rows = self.rows
@@ -131,11 +135,11 @@ class TrajectoryStations:
 
     def shared_depth_vars(self) -> Array:
         """Variances (n, 3) of the positions by what their depths share, m^2; as of ``follow``, of those alone."""
-        shared = np.zeros((len(self), max(depth.columns.width for depth in self.depths)))
+        shared = np.zeros((len(self.depths), max(depth.columns.width for depth in self.depths)))
         for own, depth in zip(shared, self.depths, strict=True):
             own[depth.columns.places] = depth.columns.values[0]
         shared = shared[:, shared.any(axis=0)]
-        along = self.rows["along"][: len(self)]
+        along = self.rows["along"][: len(self.depths)]
         kinks = (along[:-1] - along[1:])[:, :, None] * shared[:-1, None]
         found = along[:, :, None] * shared[:, None]
         found[1:] += np.cumsum(kinks, axis=0)
