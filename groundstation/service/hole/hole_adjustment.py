@@ -24,7 +24,7 @@ from groundstation.survey.adjustment.blunders import Examination
 from groundstation.survey.adjustment.looks import OF_TUBE, Looks, PathPrior
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.fusion.direction_run import DirectionRun
-from groundstation.survey.fusion.packed import as_places
+from groundstation.survey.fusion.packed import Packed
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.fusion.sphere_direction import UNKNOWN_YAW_VAR, tangent_errors
@@ -105,10 +105,10 @@ class HoleAdjustment:
             return None
         # mostly they came in that order, and rows are wide
         path, of_stops = self.path_of(mds, collar), table if are_all(rows, len(table)) else table[rows]
-        forces, station = stops.mean_forces(rows), station_of_row[rows]
+        seen = self._looked_at(of_stops, stops.mean_forces(rows), station_of_row[rows], path, self._chains)
         if scatter > 0.0:
-            path = replace(path, leg_length_var=scatter * leg_reading_shares(station, stop_numbers(of_stops["at"])))
-        seen = self._looked_at(of_stops, forces, station, path, self._chains)
+            shares = leg_reading_shares(seen.looks.station, seen.looks.stop)
+            seen = replace(seen, path=replace(path, leg_length_var=scatter * shares))
         seen = replace(seen, start=self._beginnings.start_of(rows, of_stops, seen))
         return seen.examine() if self._search is None else self._search.examine(number, seen)
 
@@ -218,4 +218,5 @@ def directions_of(examination: Examination, shared: SharedErrors, north_std: flo
     np.matmul(across, of_looks, out=np.swapaxes(columns, 0, 1)[:, :, :-1])
     columns[:, :, -1] = north_std * np.stack([-tangents[:, 1], tangents[:, 0], np.zeros(len(tangents))])
     places = shared.adjusted_places(count)  # which may be new
-    return DirectionRun(tangents, own, columns, as_places(places, shared.count), shared.count)
+    kept = Packed.of_values(columns[0], places, shared.count)  # with places of few bits
+    return DirectionRun(tangents, own, columns, kept.places, kept.width)

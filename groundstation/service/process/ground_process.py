@@ -280,8 +280,7 @@ class GroundProcess(Process):
         alarms.hold("disk", "database", refusal)
         alarms.hold("database", "database", f"{self.store.damaged} rows" if self.store.damaged else "")
         alarms.hold("database", "journal", self.store.parted)
-        dropped = self.endpoint.dropped
-        alarms.hold("queue", "ground station", f"{dropped} dropped" if dropped else "")
+        alarms.hold("queue", "ground station", f"{dropped} dropped" if (dropped := self.endpoint.dropped) else "")
         self._seal_watch.look(now)
         alarms.hold(
             "key_file", "ground station", self.endpoint.seals.trouble if self.endpoint.seals is not None else ""

@@ -12,11 +12,6 @@ Places = npt.NDArray[Any]  # of few bits where these are enough
 MOST_OF_16_BITS = 1 << 16
 
 
-def as_places(places: Places, width: int) -> Places:
-    """Places as they are kept of ``width`` columns; the same array where they are so already."""
-    return places.astype(np.uint16 if width <= MOST_OF_16_BITS else np.intp, copy=False)
-
-
 class Packed:
     """Columns (k, s) of which most are zero: a station knows those of the tubes that passed it, of a hundred tubes.
 

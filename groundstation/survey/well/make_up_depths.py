@@ -86,8 +86,7 @@ def learnt_reading_std(found: MakeUpDepths, errors: DepthErrors, tube_length: fl
         return errors.reading_std
     steps = found.steps
     seen = np.maximum(steps**2 - errors.tube_std**2 * np.diff(found.tubes), 0.0)
-    var = (KNOWN_AS * errors.reading_std**2 + 0.5 * float(np.sum(seen))) / (KNOWN_AS + len(steps))
-    return max(errors.reading_std, math.sqrt(var))
+    return _beside_known(errors, 0.5 * float(np.sum(seen)), len(steps))
 
 
 def usual_reading_std(found: MakeUpDepths, errors: DepthErrors, tube_length: float) -> float:
@@ -96,7 +95,12 @@ def usual_reading_std(found: MakeUpDepths, errors: DepthErrors, tube_length: flo
         return errors.reading_std
     steps = found.steps
     usual_var = 0.5 * (OF_MEDIAN * float(np.median(np.abs(steps)))) ** 2
-    var = (KNOWN_AS * errors.reading_std**2 + len(steps) * usual_var) / (KNOWN_AS + len(steps))
+    return _beside_known(errors, len(steps) * usual_var, len(steps))
+
+
+def _beside_known(errors: DepthErrors, squares: float, count: int) -> float:
+    """Standard deviation (m) of a reading by ``count`` squares, summed (m^2), beside what is stated; never less."""
+    var = (KNOWN_AS * errors.reading_std**2 + squares) / (KNOWN_AS + count)
     return max(errors.reading_std, math.sqrt(var))
 
 
