@@ -5,7 +5,7 @@ What a station says of a depth that was measured wrongly is judged at the true o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -31,6 +31,8 @@ class JudgedHole:
     error, cov : (s, 3) and (s, 3, 3) m, of the position: north, east, down
     unfound : rad and m, by which the last station's direction and place may be off beside, as is told, while one tube
         alone has read it
+    lean_drift, drift : (s, 2) rad and (s, 3) m, as ``lean_error`` and ``error``, of a drift of the encoder that is just
+        not found, as is told
     """
 
     md: Array
@@ -39,6 +41,17 @@ class JudgedHole:
     error: Array
     cov: Array
     unfound: tuple[float, float] = (0.0, 0.0)
+    lean_drift: Array | None = None
+    drift: Array | None = None
+
+    def without_drift(self) -> JudgedHole:
+        """The hole less as much of the drift that is told to be unfound as it seems to have, and no more than all."""
+        if self.lean_drift is None or self.drift is None:
+            return self
+        weighed = np.linalg.solve(self.lean_cov, self.lean_drift[:, :, None])[:, :, 0]
+        squares = float(np.sum(weighed * self.lean_drift))
+        part = float(np.clip(np.sum(weighed * self.lean_error) / squares, -1.0, 1.0)) if squares > 0.0 else 0.0
+        return replace(self, lean_error=self.lean_error - part * self.lean_drift, error=self.error - part * self.drift)
 
     @property
     def direction_squares(self) -> Array:
@@ -90,6 +103,7 @@ def judge_hole_of(world: World, hole: SurveyedHole) -> JudgedHole:
         hole.trajectory.positions[places] - true_positions,
         hole.trajectory.covs[places],
         unfound_of(hole),
+        *drift_of(hole),
     )
 
 
@@ -98,6 +112,13 @@ def unfound_of(hole: SurveyedHole) -> tuple[float, float]:
     examined = hole.examined if hole.is_adjusted else None
     alone = None if examined is None else examined.last_look
     return (0.0, 0.0) if alone is None else (alone.direction, alone.toe)
+
+
+def drift_of(hole: SurveyedHole) -> tuple[Array, Array] | tuple[None, None]:
+    """What is told of a drift of the encoder that is not found: of directions and of places, without the collar's."""
+    examined = hole.examined if hole.is_adjusted else None
+    drift = None if examined is None else examined.unseen_drift
+    return (None, None) if drift is None else (drift.tangents[1:, :2], drift.positions[1:])
 
 
 def true_depth(world: World, station: SurveyStation) -> float:

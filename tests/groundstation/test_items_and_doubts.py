@@ -185,3 +185,7 @@ def test_what_contradicts_itself_is_doubted_in_an_adjusted_hole() -> None:
     assert room._unfound_by_look(hole(examined=examined)) == 0.25
     assert room._unfound_by_look(hole(examined=examined, is_adjusted=False)) == 0.0
     assert room._unfound_by_look(hole(examined=SimpleNamespace(last_look=None))) == 0.0
+    slipping = SimpleNamespace(unseen_drift=SimpleNamespace(toe=0.375))
+    assert room._unfound_by_drift(hole(examined=slipping)) == 0.375
+    assert room._unfound_by_drift(hole(examined=slipping, is_adjusted=False)) == 0.0
+    assert room._unfound_by_drift(hole(examined=SimpleNamespace(unseen_drift=None))) == 0.0

@@ -177,6 +177,30 @@ def test_what_one_look_alone_may_hide_at_the_toe_is_told_and_counts_at_the_end(
     assert found.why[0].startswith("within 45 cm: ")
 
 
+@pytest.mark.parametrize(
+    ("unfound", "drift", "reached", "word", "told"),
+    [
+        (0.0, 0.044, True, Word.ON_TARGET, False),
+        (0.0, 0.046, True, Word.ON_TARGET, True),
+        (0.0, 0.31, True, Word.ON_TARGET, True),
+        (0.0, 0.32, True, Word.WATCH, True),
+        (0.0, 0.32, False, Word.ON_TARGET, True),
+        (0.3, 0.3, True, Word.ON_TARGET, True),  # one of both at a time
+        (0.3, 0.32, True, Word.WATCH, True),
+    ],
+)
+def test_what_a_belt_may_do_unfound_is_told_and_counts_at_the_end(
+    unfound: float, drift: float, reached: bool, word: Word, told: bool
+) -> None:
+    """The hole ends 13.5 cm off where 45 cm are allowed."""
+    bit = LENGTH if reached else 12.0
+    facts = Known(LENGTH, CURVATURE, STOP, bit, off(0.1), ending(0.3, 0.002, is_reached=reached), (), unfound, drift)
+    found = judge_hole(facts)
+    assert found.word is word
+    said = "a belt of the encoder that slips a little at every stop, too little to be found, would have the toe up to "
+    assert any(why.startswith(f"{said}{100 * drift:.1f} cm off") for why in found.why) is told
+
+
 def test_a_bit_at_the_end_is_not_steered_although_its_survey_is_to_come() -> None:
     found = judge_hole(known(0.95, bit=LENGTH, std=0.1))
     assert (found.word, found.deadline) == (Word.WATCH, None)

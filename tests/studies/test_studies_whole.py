@@ -22,6 +22,7 @@ from borechain.studies.blunders.run import BlunderRun, blunder_row, count_steps,
 from borechain.studies.drawn_rigs import KnownSetUp, RigDraw, tables_of
 from borechain.studies.judged_hole import (
     JudgedHole,
+    drift_of,
     judge_hole_of,
     true_depth,
     unfound_of,
@@ -115,6 +116,27 @@ def test_the_worst_is_of_its_freedom_and_less_what_is_told_to_be_unfound() -> No
     assert empty.worst_sigmas() == (0.0, 0.0)
 
 
+@pytest.mark.parametrize(("size", "part"), [(0.25, 0.25), (-0.75, -0.75), (1.0, 1.0), (1.5, 1.0), (-3.0, -1.0)])
+def test_of_a_drift_that_is_told_to_be_unfound_no_more_is_taken_off_than_all(size: float, part: float) -> None:
+    lean_drift, drift = np.array([[0.2, -0.1], [0.4, 0.3]]), np.array([[1.0, 2.0, 0.0], [3.0, 5.0, 0.5]])
+    across = np.array([[0.1, 0.2], [0.0, 0.0]])  # of no part of the drift where both axes are known alike
+    alike = np.repeat(0.01 * np.eye(2)[None], 2, axis=0)
+    slipped = JudgedHole(
+        HOLE.md, size * lean_drift + across, alike, size * drift, HOLE.cov, (0.0, 0.0), lean_drift, drift
+    )
+    left = slipped.without_drift()
+    np.testing.assert_allclose(left.lean_error, (size - part) * lean_drift + across, atol=1e-12)
+    np.testing.assert_allclose(left.error, (size - part) * drift, atol=1e-12)
+    assert replace(slipped, drift=None).without_drift().error is slipped.error
+    none = replace(slipped, lean_drift=0.0 * lean_drift).without_drift()
+    np.testing.assert_array_equal(none.error, slipped.error)
+
+
+DRIFT = SimpleNamespace(
+    tangents=np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]]), positions=np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+)
+
+
 class Told(dict[str, Any]):
     def column(self, name: str) -> Any:
         return np.array(self[name])
@@ -150,7 +172,7 @@ def test_a_hole_is_judged_without_its_collar_and_against_what_moved() -> None:
             positions=np.array([[0.0] * 3, [1.0] * 3, [8.0, 15.0, 23.0]]), covs=np.array([*PLACES, 7 * PLACES[0]])
         ),
         is_adjusted=False,
-        examined=SimpleNamespace(last_look=SimpleNamespace(direction=0.1, toe=0.2)),
+        examined=SimpleNamespace(last_look=SimpleNamespace(direction=0.1, toe=0.2), unseen_drift=DRIFT),
     )  # fmt: skip
     world = SimpleNamespace(**vars(WORLD), scenario=SimpleNamespace(hole=truth(0.1)), moved_hole=None)
     judged = judge_hole_of(world, hole)  # type: ignore[arg-type]
@@ -160,10 +182,17 @@ def test_a_hole_is_judged_without_its_collar_and_against_what_moved() -> None:
     np.testing.assert_allclose(judged.error, [[0.4, -0.2, 0.2]], atol=1e-12)
     np.testing.assert_allclose(judged.cov, [7 * PLACES[0]])
     assert judged.unfound == (0.0, 0.0)
+    assert judged.lean_drift is judged.drift is None
     hole.is_adjusted = True
     assert unfound_of(hole) == (0.1, 0.2)  # type: ignore[arg-type]
-    hole.examined = SimpleNamespace(last_look=None)
+    drifting = judge_hole_of(world, hole)  # type: ignore[arg-type]
+    assert drifting.lean_drift is not None
+    assert drifting.drift is not None
+    np.testing.assert_allclose(drifting.lean_drift, [[0.4, 0.5]])
+    np.testing.assert_allclose(drifting.drift, [[4.0, 5.0, 6.0]])
+    hole.examined = SimpleNamespace(last_look=None, unseen_drift=None)
     assert unfound_of(hole) == (0.0, 0.0)  # type: ignore[arg-type]
+    assert drift_of(hole) == (None, None)  # type: ignore[arg-type]
     world.moved_hole = SimpleNamespace(hole=truth(0.2))
     np.testing.assert_allclose(judge_hole_of(world, hole).lean_error, [[0.8 - 1.52, 1.9 - 3.04]], atol=1e-12)  # type: ignore[arg-type]
 

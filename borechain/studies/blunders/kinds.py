@@ -35,6 +35,7 @@ class PlantedBlunder:
     change : the scenario of a rig with it
     named : what the adjustment may call it, see ``groundstation.survey.adjustment``
     seen_by : the check by which alone it is seen, where it is in no reading
+    is_drift : the encoder slips at every stop; what it may do unfound is told beside the sigma
     """
 
     name: str
@@ -43,6 +44,7 @@ class PlantedBlunder:
     change: Change
     named: tuple[str, ...] = ()
     seen_by: str = ""
+    is_drift: bool = False
 
 
 def of_disturbance(name: str, keys: Callable[[float], dict[str, Any]]) -> Change:
@@ -219,7 +221,7 @@ KINDS: Final[tuple[PlantedBlunder, ...]] = (
     ),
     PlantedBlunder(
         "belt slips", "", (1e-4, 1e-3, 1e-2),
-        lambda tables, part: in_field(tables, encoder={"belt_slip": part}), TURN,
+        lambda tables, part: in_field(tables, encoder={"belt_slip": part}), TURN, is_drift=True,
     ),
     PlantedBlunder(
         "encoder jumps", "deg", (0.5, 5.0, 60.0),

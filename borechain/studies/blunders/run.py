@@ -3,7 +3,7 @@
 Rigs are those of the study ``set-up``, each with one blunder of a kind and a size beside what is drawn. The worst
 error of a station, direction or position, is counted in what is stated of it. Beyond three standard deviations a hole
 may not be ON TARGET without a word: that is ``missed``. What the last look alone may hide is told beside the sigma, and
-counts there.
+counts there; so does what an encoder that slips at every stop may do unfound, in a rig whose encoder does.
 """
 
 from __future__ import annotations
@@ -89,7 +89,8 @@ def run_rig(job: BlunderJob) -> BlunderRun:
     world = World(scenario_of(dict(tables_with(job))), job.draw.seed)
     with heard_ground(world, IN_ONE) as ground:
         judged = judge_hole_of(world, ground.model.hole)
-        direction, worst = judged.worst_sigmas()
+        is_drift = job.kind is not None and KINDS[job.kind].is_drift
+        direction, worst = (judged.without_drift() if is_drift else judged).worst_sigmas()
         toe = 1e3 * float(np.linalg.norm(judged.error[-1, :2])) if len(judged.md) else math.nan
         return BlunderRun(worst, direction, toe, answer_of(ground))
 

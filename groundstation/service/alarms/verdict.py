@@ -47,6 +47,7 @@ class Known:
     projection: ProjectedEnd | None = None  # at the target, if the hole goes on as it tends to
     doubts: tuple[tuple[VerdictDoubt, str], ...] = ()
     unfound: float = 0.0  # m by which the toe may be off if the tube errs that read the last station alone
+    drift: float = 0.0  # likewise if the encoder slips a little at every stop, too little to be found
 
     @property
     def is_at_end(self) -> bool:
@@ -134,8 +135,9 @@ def judge_surveys(known: Known) -> HoleVerdict:
         return HoleVerdict(Word.WATCH, Word.WATCH, (why,), (), "deviation", worst, is_at_end=known.is_at_end)
     deadline = None if known.is_at_end or end.within >= SURE else correction_deadline(end, known)
     word, why = _word_of(end, deadline, known.stop)
-    reasons = (why, *_say_look_alone(end, known))
-    if word is Word.ON_TARGET and known.is_at_end and math.hypot(*end.ends.offset) + known.unfound > end.limit:
+    reasons = (why, *_say_look_alone(end, known), *_say_drift(end, known))
+    beside = max(known.unfound, known.drift)  # two mistakes at once that nothing shows are not reckoned with
+    if word is Word.ON_TARGET and known.is_at_end and math.hypot(*end.ends.offset) + beside > end.limit:
         word = Word.WATCH
     return HoleVerdict(word, word, reasons, (), "projection", end.ends, end, deadline, known.is_at_end)
 
@@ -147,6 +149,16 @@ def _say_look_alone(end: ProjectedEnd, known: Known) -> tuple[str, ...]:
     return (
         f"one tube alone has read the last station: were it wrong there, the toe would be up to "
         f"{100.0 * known.unfound:.1f} cm off; the next survey shows it, or one with the string lifted by a tube",
+    )
+
+
+def _say_drift(end: ProjectedEnd, known: Known) -> tuple[str, ...]:
+    """What an encoder that slips at every stop may do, where that is a good part of the limit."""
+    if known.drift < WORTH_TELLING * end.limit:
+        return ()
+    return (
+        f"a belt of the encoder that slips a little at every stop, too little to be found, would have the toe up to "
+        f"{100.0 * known.drift:.1f} cm off: hold the encoder against the mark on the drive head",
     )
 
 

@@ -47,6 +47,7 @@ def known_of(
         worst=worst,
         projection=hole.projection if worst is not None else None,
         unfound=_unfound_by_look(hole),
+        drift=_unfound_by_drift(hole),
         doubts=(
             *_doubts_of_setup(config, setup, string),
             *_doubts_of_time(string, alarms, config.stale_after),
@@ -61,6 +62,13 @@ def _unfound_by_look(hole: SurveyedHole) -> float:
     examined = hole.examined if hole.is_adjusted else None
     alone = None if examined is None else examined.last_look
     return 0.0 if alone is None else alone.toe
+
+
+def _unfound_by_drift(hole: SurveyedHole) -> float:
+    """By how much (m) the toe may be off if the encoder slips at every stop, too little to be found."""
+    examined = hole.examined if hole.is_adjusted else None
+    drift = None if examined is None else examined.unseen_drift
+    return 0.0 if drift is None else drift.toe
 
 
 def _doubts_of_setup(config: GroundConfig, setup: SetupBook, string: KnownString) -> Iterator[tuple[VerdictDoubt, str]]:

@@ -59,6 +59,7 @@ def answer_verdict(k: RigModel, _p: Parameters) -> Verdict:
         target_m=known.target,
         what=found.what or None,
         unfound_cm=round(CM * known.unfound, 2),
+        unfound_drift_cm=round(CM * known.drift, 2),
         off=None if found.about is None else off_target_view(found.about, found.end),
         steer=way,
     )

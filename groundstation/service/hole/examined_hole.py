@@ -17,12 +17,13 @@ from groundstation.survey.adjustment.blunders import Blunder, Examination, chanc
 from groundstation.survey.adjustment.budget import ErrorShare, ShareSource, toe_budget
 from groundstation.survey.adjustment.hypotheses import Hypothesis
 from groundstation.survey.adjustment.last_look import LastLook, look_alone
-from groundstation.survey.adjustment.least_found import LARGEST, possible_mistakes
+from groundstation.survey.adjustment.least_found import DRIFT, LARGEST, possible_mistakes
 from groundstation.survey.adjustment.next_stop import NextStop, plan_stop
 from groundstation.survey.adjustment.position_shares import position_shares
 from groundstation.survey.adjustment.reliability import Reliability, measure_reliability
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.toe_weights import toe_weights
+from groundstation.survey.adjustment.unseen_drift import UnseenDrift, drift_unseen
 from groundstation.survey.fusion.shared import KINDS
 
 Array = npt.NDArray[np.float64]
@@ -152,11 +153,21 @@ class ExaminedHole:
         """What stands on the lowest tube's last look alone; None where another has read the last station too."""
         return look_alone(self.adjusted, self.run, self.chance)
 
+    @property
+    def is_drift_known(self) -> bool:
+        """Whether the encoder was found to slip at every stop, by a size that is in the ± of the hole."""
+        return DRIFT in self.examination.taken_in
+
+    @cached_property
+    def unseen_drift(self) -> UnseenDrift | None:
+        """What an encoder that slips a little at every stop may do unfound; None while too few stops tell it."""
+        return None if self.is_drift_known else drift_unseen(self.adjusted, self.run, self.chance)
+
     @cached_property
     def reliabilities(self) -> list[Reliability]:
         """How well what may go wrong with each tube at its newest stop, and with the string, would be found."""
         found, run = self.adjusted, self.run
-        possible = possible_mistakes(found.looks, run)
+        possible = [one for one in possible_mistakes(found.looks, run) if not (one == DRIFT and self.is_drift_known)]
         return measure_reliability(found, run, possible, toe_weights(found), LARGEST, self.chance)
 
 

@@ -65,6 +65,7 @@ MISTAKES: Mapping[BlunderKind, str] = {
     K.MOUNT_TURNED: "a mount of tube {tube} that turns",
     K.JOINT_SLIPPED: "a slip of the joint above tube {tube}",
     K.ENCODER_SLIPPED: "a slip of the encoder",
+    K.ENCODER_DRIFTS: "a slip of the encoder at every stop",
     K.DEPTH_WRONG_ONCE: "a wrong depth at this stop",
 }
 

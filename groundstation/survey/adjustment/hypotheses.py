@@ -149,8 +149,16 @@ def _turned_by(one: Hypothesis, looks: Looks, run: RunOfStops) -> Array:
     if one.kind is K.ENCODER_SLIPPED:
         return np.ones(len(looks))
     if one.kind is K.ENCODER_DRIFTS:
-        return looks.stop.astype(np.float64)  # a belt slips by a part of what it turns, about the same at every stop
+        return turns_of_drift(looks)
     return run.causes.turned_by(run.causes.names.index((JOINT, one.subject[0])), looks)
+
+
+def turns_of_drift(looks: Looks) -> Array:
+    """Stops (n,) until each look: a belt slips by a part of what it turns, about the same before every stop.
+
+    Before the first, too: north is told before the string turns.
+    """
+    return np.asarray(looks.stop + 1.0)
 
 
 def all_hypotheses(looks: Looks, run: RunOfStops) -> Iterator[Hypothesis]:

@@ -1,4 +1,7 @@
-"""The smallest mistake of each kind that would be found at the last stop, where it would do most at the toe."""
+"""The smallest mistake of each kind that would be found at the last stop, where it would do most at the toe.
+
+And the smallest drift of the encoder: it is of all stops.
+"""
 
 from __future__ import annotations
 
@@ -9,26 +12,36 @@ from typing import Final
 import numpy as np
 
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
-from groundstation.survey.adjustment.hypotheses import Hypothesis
+from groundstation.survey.adjustment.hypotheses import FEWEST_TO_CREEP, Hypothesis
 from groundstation.survey.adjustment.looks import Looks
 from groundstation.survey.adjustment.reliability import Reliability
 from groundstation.survey.adjustment.run_of_stops import JOINT, RunOfStops
 
 K = BlunderKind
 DEG: Final = np.pi / 180.0
+DRIFT: Final = Hypothesis(K.ENCODER_DRIFTS, ())
 LARGEST: Final[Mapping[BlunderKind, float]] = {  # that is to be reckoned with where nothing would find it; SI and rad
     K.BIAS_STEPPED: 0.2,  # 20 mg: a sensor that was knocked
     K.TILT_SLIPPED: 0.5 * DEG,  # of a mount as it is made
     K.MOUNT_TURNED: 5.0 * DEG,
     K.JOINT_SLIPPED: 5.0 * DEG,
     K.ENCODER_SLIPPED: 7.2 * DEG,  # one tooth of a belt of fifty
+    K.ENCODER_DRIFTS: 0.5 * DEG,  # at every stop: a wheel that slips by 3e-4 of five turns
     K.DEPTH_WRONG_ONCE: 0.5,
 }
 
 
 def possible_mistakes(looks: Looks, run: RunOfStops) -> list[Hypothesis]:
-    """What may go wrong at the last stop: with each tube that looked there, its joint, the encoder, the depth."""
-    return list(_of_last_stop(looks, run))
+    """What may go wrong at the last stop: with each tube that looked there, its joint, the encoder, the depth.
+
+    From three stops on the encoder may slip a little at every one, too.
+    """
+    return [*_of_last_stop(looks, run), *possible_drift(looks)]
+
+
+def possible_drift(looks: Looks) -> tuple[Hypothesis, ...]:
+    """An encoder that slips alike at every stop, where there are stops enough to tell that from a single slip."""
+    return (DRIFT,) if len(np.unique(looks.stop)) > FEWEST_TO_CREEP else ()
 
 
 def _of_last_stop(looks: Looks, run: RunOfStops) -> Iterator[Hypothesis]:

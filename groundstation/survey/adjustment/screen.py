@@ -15,6 +15,7 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.collar import collar_departure
 from groundstation.survey.adjustment.equations import string_departure, turn_places
+from groundstation.survey.adjustment.hypotheses import turns_of_drift
 from groundstation.survey.adjustment.looks import BIAS, OF_TUBE, TILT
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
 from groundstation.survey.adjustment.scores import best_sizes, log_chances, whitened_effects
@@ -82,7 +83,7 @@ def _turn_test(found: Adjusted, run: RunOfStops, pulled: Array, white: Array) ->
     looks = found.looks
     since = looks.stop >= np.unique(looks.stop)[:, None]
     turned = np.concatenate([run.causes.turned_looks(looks), np.ones((1, len(looks)))])
-    masks = np.concatenate([(turned[:, None] * since).reshape(-1, len(looks)), looks.stop[None].astype(np.float64)])
+    masks = np.concatenate([(turned[:, None] * since).reshape(-1, len(looks)), turns_of_drift(looks)[None]])
     return _masked_test(found, pulled, white, masks, found.linear.jacobians[:, :, 7:8])
 
 

@@ -59,7 +59,7 @@ def run() -> RunOfStops:
         (Hypothesis(K.JOINT_MISREAD, (1,)), [0, 0, 1, 0.5, 1.5, 0.5]),
         (Hypothesis(K.JOINT_SLIPPED, (1,), 2), [0, 0, 0, 0.5, 1.5, 0.5]),
         (Hypothesis(K.ENCODER_SLIPPED, (), 1), [0, 1, 1, 1, 1, 1]),
-        (Hypothesis(K.ENCODER_DRIFTS, ()), [0, 1, 1, 2, 2, 2]),
+        (Hypothesis(K.ENCODER_DRIFTS, ()), [1, 2, 2, 3, 3, 3]),
         (Hypothesis(K.DEPTH_WRONG_ONCE, (), 1), [0, 1, 1, 0, 0, 0]),
         (Hypothesis(K.DEPTH_WRONG_FROM, (), 1), [0, 1, 1, 1, 1, 1]),
         (Hypothesis(K.HOLE_MOVED, (1, 2), 2), [-1, -1, -1, 0, 0, 0]),  # looks of before are off

@@ -158,5 +158,8 @@ class Verdict:
     target_m: Annotated[float, "length of the design axis"]
     what: Annotated[str | None, "which deviation decided", OneOf("deviation", "projection")]
     unfound_cm: Annotated[float, "by which the toe may be off if the tube errs that read the last station alone"]
+    unfound_drift_cm: Annotated[
+        float, "by which the toe may be off if the encoder slips a little at every stop, too little to be found"
+    ]
     off: Off | None
     steer: Steer | None

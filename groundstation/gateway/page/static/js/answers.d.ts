@@ -108,6 +108,8 @@ export interface Verdict {
   what: "deviation" | "projection" | null;
   /** by which the toe may be off if the tube errs that read the last station alone */
   unfound_cm: number;
+  /** by which the toe may be off if the encoder slips a little at every stop, too little to be found */
+  unfound_drift_cm: number;
   off: Off | null;
   steer: Steer | null;
 }
