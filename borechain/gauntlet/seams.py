@@ -41,7 +41,7 @@ SEAMS: tuple[Seam, ...] = (
     Seam("telemetry.transport.hop", "ACK_DELAY", (0.0, 0.3), "s, that an acknowledgement waits"),
     Seam("telemetry.application.outbox", "LAST_RETRY", (0.5, 5.0), "s, between two repetitions from end to end"),
     Seam("telemetry.application.end_to_end", "KEPT_WAIT", (0.0, 8.0), "s, that a message waits for a state"),
-    Seam("telemetry.application.endpoint", "HELLO_WAIT", (0.0, 3.0), "s, that a hello waits for others"),
+    Seam("telemetry.application.endpoint", "HELLO_WAIT", (0.0, 0.9), "s, that a hello waits for others"),
     Seam("telemetry.application.endpoint", "STATE_WAIT", (0.0, 3.0), "s, that a state waits for those below"),
     Seam("telemetry.application.endpoint", "SYNC_BURST", (1, 5), "comparisons of clocks at the quick pace"),
     Seam("telemetry.application.endpoint", "SYNC_SLOW", (1.0, 30.0), "s, between two comparisons of clocks"),
