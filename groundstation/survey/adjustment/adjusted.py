@@ -89,6 +89,8 @@ class Adjusted:
     @cached_property
     def by_common(self) -> Array:
         """Change of every state (s + 1, 4, p) for one unit of what stations have in common."""
+        if self.solution.by_common is not None:
+            return self.solution.by_common
         right = -self.solution.coupled
         substitute_path(self.solution.diagonal, self.solution.tied, right)
         return right
