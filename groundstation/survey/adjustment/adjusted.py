@@ -174,6 +174,14 @@ class Adjusted:
         states = right + (self.by_common.reshape(-1, len(found)) @ found).reshape(right.shape)
         return states, found
 
+    def spread_of(self, weights: Array) -> tuple[Array, Array]:
+        """Covariance of all unknowns with functionals (s + 1, 2, r) of directions, as ``cofactor``; each is kept."""
+        kept: dict[bytes, tuple[Array, Array]] = self.__dict__.setdefault("spreads", {})
+        asked = weights.tobytes()
+        if asked not in kept:
+            kept[asked] = self.cofactor(weights, np.zeros((len(self.known), weights.shape[2])))
+        return kept[asked]
+
     def covs_with_collar(self, count: int) -> Array:
         """Covariances (at most ``count``, 4, 2) of the first states with the direction at the collar, as ``cofactor``.
 
@@ -189,6 +197,13 @@ class Adjusted:
 
     def free_parts(self, rows: Places) -> Array:
         """Part P_k (r, 3, 3) of the inverse covariance of some looks that is free to contradict: W - W J Q J^T W."""
+        kept: dict[bytes, Array] = self.__dict__.setdefault("parts", {})
+        asked = rows.tobytes()
+        if asked not in kept:
+            kept[asked] = self._free_parts(rows)
+        return kept[asked]
+
+    def _free_parts(self, rows: Places) -> Array:
         from groundstation.survey.adjustment.kernels.free_parts import free_parts
 
         looks, size = self.looks.part(rows), len(self.common_cov)
