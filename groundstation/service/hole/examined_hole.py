@@ -67,7 +67,7 @@ class ExaminedHole:
 
     @property
     def drawn(self) -> Adjusted:
-        """The hole as it is drawn, with the ± of its positions; without its looks."""
+        """The hole as it is drawn, with the ± of its positions."""
         return self.examination.drawn
 
     def sentence(self, blunder: Blunder) -> str:
@@ -102,8 +102,7 @@ class ExaminedHole:
     @cached_property
     def shares(self) -> list[ErrorShare]:
         """Of what the variance at the toe is made."""
-        drawn = self.examination.drawn_with_looks
-        return [*toe_budget(drawn, self.run.causes), *self._suspected(toe_weights(drawn))]
+        return [*toe_budget(self.drawn, self.run.causes), *self._suspected(toe_weights(self.drawn))]
 
     def _suspected(self, weights: Array) -> list[ErrorShare]:
         """Share of a suspicion in the variance of functionals (s + 1, 2, r) of the directions."""
@@ -124,7 +123,7 @@ class ExaminedHole:
     def position_variances(self) -> dict[str, Array]:
         """Variances (s + 1, 3), m^2, of collar and stations to north, east and down by what looks have in common."""
         found: dict[str, Array] = {}
-        for share in position_shares(self.examination.drawn_with_looks, self.run.causes):
+        for share in position_shares(self.drawn, self.run.causes):
             name = SOURCE_NAMES.get(share.source)
             if share.source is ShareSource.TURN:
                 name = KINDS.get(self.share_name(share)[0], "joints")

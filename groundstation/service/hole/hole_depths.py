@@ -66,14 +66,15 @@ class HoleDepths:
         stds = length_stds(self._setup) if self._setup.lengths else {}
         told = {place: stds[tube] for tube, place in self._shared.places_of_lengths(stds).items()} if stds else {}
         found, places_of = {}, self._stops.depth_places.__getitem__
+        reading_var, setup = errors.reading_std**2, self._setup.version
         for one in stations:
-            made_of = (len(one.stops.rows), one.revised, self._setup.version)
+            made_of = (len(one.stops.rows), one.revised, setup)
             known = self._columns.get(one.md)
             if known is None or known[0] != made_of:  # what all of its readings share is as it was
                 places = [*map(places_of, one.stops.rows)]
                 columns = mean_depth(one.md, places, errors, self._config.tube_length, told).columns
                 known = self._columns[one.md] = made_of, columns
-            found[one.md] = StationDepth(known[1], errors.reading_std**2 / made_of[0])
+            found[one.md] = StationDepth(known[1], reading_var / made_of[0])
         return found
 
     def scatter(self, version: int) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -70,12 +70,6 @@ class Adjusted:
         sums = np.stack([np.bincount(tube, one, minlength=count) for one in self.looks.force.T], axis=1)
         return sums / np.maximum(counts, 1)[:, None], counts
 
-    def without_looks(self) -> Adjusted:
-        """Directions and their covariance alone: what is kept of looks (n,) where no look is asked about any more."""
-        of_looks = ("jacobians", "weights", "residuals", "squares", "tilts")
-        none = {name: getattr(self.linear, name)[:0].copy() for name in of_looks}
-        return replace(self, linear=replace(self.linear, **none))
-
     @property
     def bases(self) -> Array:
         """Two unit vectors (s + 1, 2, 3) across the direction at collar and stations, in which their errors are."""
@@ -89,6 +83,8 @@ class Adjusted:
     @cached_property
     def by_common(self) -> Array:
         """Change of every state (s + 1, 4, p) for one unit of what stations have in common."""
+        if self.solution.by_common is not None:
+            return self.solution.by_common
         right = -self.solution.coupled
         substitute_path(self.solution.diagonal, self.solution.tied, right)
         return right
@@ -172,6 +168,14 @@ class Adjusted:
         states = right + (self.by_common.reshape(-1, len(found)) @ found).reshape(right.shape)
         return states, found
 
+    def spread_of(self, weights: Array) -> tuple[Array, Array]:
+        """Covariance of all unknowns with functionals (s + 1, 2, r) of directions, as ``cofactor``; each is kept."""
+        kept: dict[bytes, tuple[Array, Array]] = self.__dict__.setdefault("spreads", {})
+        asked = weights.tobytes()
+        if asked not in kept:
+            kept[asked] = self.cofactor(weights, np.zeros((len(self.known), weights.shape[2])))
+        return kept[asked]
+
     def covs_with_collar(self, count: int) -> Array:
         """Covariances (at most ``count``, 4, 2) of the first states with the direction at the collar, as ``cofactor``.
 
@@ -187,6 +191,13 @@ class Adjusted:
 
     def free_parts(self, rows: Places) -> Array:
         """Part P_k (r, 3, 3) of the inverse covariance of some looks that is free to contradict: W - W J Q J^T W."""
+        kept: dict[bytes, Array] = self.__dict__.setdefault("parts", {})
+        asked = rows.tobytes()
+        if asked not in kept:
+            kept[asked] = self._free_parts(rows)
+        return kept[asked]
+
+    def _free_parts(self, rows: Places) -> Array:
         from groundstation.survey.adjustment.kernels.free_parts import free_parts
 
         looks, size = self.looks.part(rows), len(self.common_cov)

@@ -40,8 +40,10 @@ def cost_blunders(examination: Examination) -> list[BlunderCost | None]:
 
     That is what has a known size, and a collar that was told wrong.
     """
+    if not examination.blunders:
+        return []
     found = examination.adjusted
-    _, common = found.cofactor(toe_weights(found), np.zeros((len(found.known), 3)))
+    _, common = found.spread_of(toe_weights(found))
     taken_in, width = examination.taken_in, found.string.width
     places = dict(zip(taken_in, places_among_further(taken_in), strict=True))
     shared, cov = common[width:], found.common_cov[width:, width:]

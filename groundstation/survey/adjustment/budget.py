@@ -68,13 +68,8 @@ def error_budget(found: Adjusted, weights: Array, causes: TurnCauses) -> list[Er
     weights : (s + 1, 2, r), the functionals
     causes : of the turns of tubes; what ``StringPrior.turn_cov`` has beside them has no name
     """
-    states, common = _spread(found, weights)
+    states, common = found.spread_of(weights)
     return [*_of_looks(found, moved_looks(found, states, common)), *_of_priors(found, states, common, causes)]
-
-
-def _spread(found: Adjusted, weights: Array) -> tuple[Array, Array]:
-    """Covariance of states (s + 1, 4, r) and of what is in common (p, r) with the functionals."""
-    return found.cofactor(weights, np.zeros((len(found.known), weights.shape[2])))
 
 
 def _of_priors(found: Adjusted, states: Array, common: Array, causes: TurnCauses) -> list[ErrorShare]:
@@ -109,12 +104,12 @@ def _of_looks(found: Adjusted, moved: Array) -> list[ErrorShare]:
     """Noise of the force, play and noise of the yaw; what a look that counts less adds is theirs in proportion."""
     looks, linear = found.looks, found.linear
     pulled = linear.weights @ moved
-    whole = np.sum(pulled * moved, axis=1)
+    whole = np.einsum("kar,kar->kr", pulled, moved)
     turned = np.swapaxes(linear.jacobians[:, :, 5:8], 1, 2) @ pulled
     squares = turned * turned
     parts = np.stack([
-        looks.force_var[:, None] * np.sum(pulled * pulled, axis=1),
-        found.now.play_var * np.sum(squares[:, :2], axis=1),
+        looks.force_var[:, None] * np.einsum("kar,kar->kr", pulled, pulled),
+        found.now.play_var * (squares[:, 0] + squares[:, 1]),
         looks.yaw_var[:, None] * squares[:, 2],
     ])  # fmt: skip
     total = parts.sum(axis=0)

@@ -8,7 +8,7 @@ use in geodetic networks", Netherlands Geodetic Commission 2 (1968).
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,23 +72,38 @@ def effect_of(
     """
     amplitude = effect_amplitudes(one, looks, run)
     rows = np.flatnonzero(amplitude)
-    by = linear.jacobians[rows]
+    return rows, np.asarray(_unit_effect(one, looks, run, now, linear, reach)[rows] * amplitude[rows, None, None])
+
+
+def effects_of(
+    same: Sequence[Hypothesis], looks: Looks, run: RunOfStops, now: StartingPoint, linear: Linearised
+) -> Array:
+    """Change (n, 3, h, q) of the force of all looks by hypotheses of one kind, see ``effect_of``."""
+    amplitudes = amplitudes_of(same, looks, run).T[:, None, :, None]
+    every = same if same[0].kind is K.TUBES_EXCHANGED else same[:1]  # others are alike but for where they are
+    return np.asarray(amplitudes * np.stack([_unit_effect(one, looks, run, now, linear) for one in every], axis=2))
+
+
+def _unit_effect(
+    one: Hypothesis, looks: Looks, run: RunOfStops, now: StartingPoint, linear: Linearised, reach: float = 0.0
+) -> Array:
+    """Change (n, 3, q) of the force of looks by one unit of a hypothesis, were there all of it in each."""
+    by = linear.jacobians
     if one.kind in OF_FORCE:
-        columns = np.broadcast_to(np.eye(3), (len(rows), 3, 3))
-    elif one.kind in BY_TILT:
-        columns = by[:, :, 5:7]
-    elif one.kind in BY_TURN:
-        columns = by[:, :, 7:8]
-    elif one.kind is K.HOLE_MOVED:
-        columns = by[:, :, :2]
-    elif one.kind is K.AXES_EXCHANGED:
-        columns = (looks.force[rows] - looks.force[rows][:, SWAPPED])[:, :, None]
-    elif one.kind is K.TUBES_EXCHANGED:
-        columns = np.einsum("kab,kb->ka", by[:, :, :2], _apart(one, looks, now, linear, rows))[:, :, None]
+        return np.broadcast_to(np.eye(3), (len(looks), 3, 3))
+    if one.kind in BY_TILT:
+        return by[:, :, 5:7]
+    if one.kind in BY_TURN:
+        return by[:, :, 7:8]
+    if one.kind is K.HOLE_MOVED:
+        return by[:, :, :2]
+    if one.kind is K.AXES_EXCHANGED:
+        return (looks.force - looks.force[:, SWAPPED])[:, :, None]
+    if one.kind is K.TUBES_EXCHANGED:
+        bent = _apart(one, looks, now, linear)
     else:
-        bent = _bent_by_metre(run.station_md, now, linear, reach)[looks.station[rows]]
-        columns = np.einsum("kab,kb->ka", by[:, :, :2], bent)[:, :, None]
-    return rows, np.asarray(columns * amplitude[rows, None, None])
+        bent = _bent_by_metre(run.station_md, now, linear, reach)[looks.station]
+    return np.asarray(np.einsum("kab,kb->ka", by[:, :, :2], bent)[:, :, None])
 
 
 def _bent_by_metre(md: Array, now: StartingPoint, linear: Linearised, reach: float) -> Array:
@@ -101,11 +116,10 @@ def _bent_by_metre(md: Array, now: StartingPoint, linear: Linearised, reach: flo
     return np.asarray(bent + beyond * now.curvatures[-1])
 
 
-def _apart(one: Hypothesis, looks: Looks, now: StartingPoint, linear: Linearised, rows: Places) -> Array:
-    """How far (r, 2), rad, the hole points elsewhere where the other of two tubes looked."""
-    station = looks.station[rows]
-    apart = now.tangents[exchanged_stations(looks, one.subject)[rows]] - now.tangents[station]
-    return np.asarray(np.einsum("kai,ki->ka", linear.bases[station], apart))
+def _apart(one: Hypothesis, looks: Looks, now: StartingPoint, linear: Linearised) -> Array:
+    """How far (n, 2), rad, the hole points elsewhere where the other of two tubes looked."""
+    apart = now.tangents[exchanged_stations(looks, one.subject)] - now.tangents[looks.station]
+    return np.asarray(np.einsum("kai,ki->ka", linear.bases[looks.station], apart))
 
 
 def exchanged_stations(looks: Looks, tubes: tuple[int, ...]) -> Places:
@@ -118,39 +132,47 @@ def exchanged_stations(looks: Looks, tubes: tuple[int, ...]) -> Places:
 
 
 def effect_amplitudes(one: Hypothesis, looks: Looks, run: RunOfStops) -> Array:
-    """How much (n,) of a hypothesis is in each look; 0 in those that it leaves alone.
+    """How much (n,) of a hypothesis is in each look; 0 in those that it leaves alone."""
+    return np.asarray(amplitudes_of([one], looks, run)[0])
+
+
+def amplitudes_of(same: Sequence[Hypothesis], looks: Looks, run: RunOfStops) -> Array:
+    """The same (h, n) of hypotheses of one kind.
 
     Where the hole moved it is the looks before that are off, so that the directions are those of the hole as it is.
     """
-    amount: Array | float = -1.0 if one.kind is K.HOLE_MOVED else 1.0
-    if one.kind in OF_CHAIN:
-        amount = _turned_by(one, looks, run)
-    elif one.kind is K.BIAS_CREEPS:
-        amount = run.time[looks.stop] - run.time[one.stop]
-    return np.where(_is_touched(one, looks), amount, 0.0)
+    kind, stops = same[0].kind, np.array([one.stop for one in same])
+    amount: Array | float = -1.0 if kind is K.HOLE_MOVED else 1.0
+    if kind in OF_CHAIN:
+        amount = _turned_by(same, looks, run)
+    elif kind is K.BIAS_CREEPS:
+        amount = run.time[looks.stop] - run.time[stops][:, None]
+    return np.where(_are_touched(same, stops[:, None], looks), amount, 0.0)
 
 
-def _is_touched(one: Hypothesis, looks: Looks) -> npt.NDArray[np.bool_]:
-    """Which looks (n,) a hypothesis may change."""
-    since = looks.stop >= one.stop
-    if one.kind is K.TUBES_EXCHANGED:
-        return np.asarray(exchanged_stations(looks, one.subject) != looks.station)
-    if one.kind is K.HOLE_MOVED:
-        return np.asarray(~since & (looks.station >= one.subject[0]) & (looks.station <= one.subject[1]))
-    if one.kind in (K.DEPTH_WRONG_ONCE, K.LOOK_WRONG):
-        since = looks.stop == one.stop
-    if one.kind in (*OF_CHAIN, *BY_DEPTH):
-        return since
-    return np.asarray(since & (looks.tube == one.subject[0]))
+def _are_touched(same: Sequence[Hypothesis], stops: Places, looks: Looks) -> npt.NDArray[np.bool_]:
+    """Which looks (h, n) hypotheses of one kind and of stops (h, 1) may change."""
+    kind = same[0].kind
+    if kind is K.TUBES_EXCHANGED:
+        return np.array([exchanged_stations(looks, one.subject) != looks.station for one in same])
+    since = looks.stop == stops if kind in (K.DEPTH_WRONG_ONCE, K.LOOK_WRONG) else looks.stop >= stops
+    if kind in (*OF_CHAIN, *BY_DEPTH):
+        return np.asarray(since)
+    subjects = np.array([one.subject for one in same])
+    if kind is K.HOLE_MOVED:
+        return np.asarray(~since & (looks.station >= subjects[:, :1]) & (looks.station <= subjects[:, 1:]))
+    return np.asarray(since & (looks.tube == subjects[:, :1]))
 
 
-def _turned_by(one: Hypothesis, looks: Looks, run: RunOfStops) -> Array:
-    """Turn (n,) of the yaw of every look for one radian of a joint or of the encoder."""
-    if one.kind is K.ENCODER_SLIPPED:
+def _turned_by(same: Sequence[Hypothesis], looks: Looks, run: RunOfStops) -> Array:
+    """Turn (h, n), or of all alike (n,), of the yaw of every look for one radian of joints or of the encoder."""
+    kind, causes = same[0].kind, run.causes
+    if kind is K.ENCODER_SLIPPED:
         return np.ones(len(looks))
-    if one.kind is K.ENCODER_DRIFTS:
+    if kind is K.ENCODER_DRIFTS:
         return turns_of_drift(looks)
-    return run.causes.turned_by(run.causes.names.index((JOINT, one.subject[0])), looks)
+    places = {name: place for place, name in enumerate(causes.names)}
+    return causes.turned_by(np.array([places[JOINT, one.subject[0]] for one in same]), looks)
 
 
 def turns_of_drift(looks: Looks) -> Array:

@@ -46,7 +46,9 @@ def _of_joints(looks: Looks, run: RunOfStops, place: Places, is_onset: Truths) -
     """A joint that was misread, and that slipped at any onset but the first stop that it is in."""
     causes = run.causes
     rows = [number for number, (kind, _) in enumerate(causes.names) if kind == JOINT]
-    pairs, pair_of = np.unique(looks.tube * causes.of_make_ups.shape[1] + looks.make_up, return_inverse=True)
+    numbers = looks.tube * causes.of_make_ups.shape[1] + looks.make_up
+    is_pair = np.bincount(numbers) > 0  # of so many looks sorting them takes longer than all the rest
+    pairs, pair_of = np.flatnonzero(is_pair), (np.cumsum(is_pair) - 1)[numbers]
     tube, make_up = np.divmod(pairs, causes.of_make_ups.shape[1])
     turned = (causes.of_tubes[rows][:, tube] + causes.of_make_ups[rows][:, make_up]) != 0.0
     at = np.zeros((len(pairs), len(is_onset)), np.float32)

@@ -5,7 +5,6 @@ And the smallest drift of the encoder: it is of all stops.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
@@ -69,11 +68,16 @@ def newest_stops(looks: Looks) -> dict[int, int]:
 def worst_of_kinds(told: Sequence[Reliability]) -> list[Reliability]:
     """Of each kind that which does most at the toe when it is not found, to north or east; the worst first."""
     places = {kind: place for place, kind in enumerate(K)}
-    by_kind = sorted(told, key=lambda one: places[one.hypothesis.kind])
-    groups = itertools.groupby(by_kind, key=lambda one: one.hypothesis.kind)
-    return sorted((max(same, key=unfound_across) for _, same in groups), key=lambda one: -unfound_across(one))
+    worst: dict[BlunderKind, tuple[float, Reliability]] = {}
+    for one in told:
+        size, kind = unfound_across(one), one.hypothesis.kind
+        if kind not in worst or size > worst[kind][0]:
+            worst[kind] = size, one
+    by_kind = sorted(worst.values(), key=lambda pair: places[pair[1].hypothesis.kind])
+    return [one for _, one in sorted(by_kind, key=lambda pair: -pair[0])]
 
 
 def unfound_across(one: Reliability) -> float:
     """What one that is not found does at the toe, m: the larger of north and east; the functionals are the toe's."""
-    return float(np.max(one.unfound[:2]))
+    north, east = map(min, one.at_toe[:2].tolist(), one.by_size[:2].tolist())  # of hundreds
+    return float(max(north, east))

@@ -116,6 +116,8 @@ class LinearSolution:
     of_path : by how much the sum of squares is less for a step of these alone
     at_station, whole : (s + 1, 2, 2) and (p, p), information of the looks on each direction, and of looks and what was
         known before on what stations have in common, before the path was taken out
+    sparse : (s + 1, 2, p), what couples directions and what is in common, where most of it is zero
+    by_common : (s + 1, 4, p), change of every state for one unit of what is in common, where it is known already
     """
 
     diagonal: Array
@@ -127,6 +129,7 @@ class LinearSolution:
     at_station: Array
     whole: Array
     sparse: Array | None = None
+    by_common: Array | None = None
 
     @property
     def cov(self) -> Array:

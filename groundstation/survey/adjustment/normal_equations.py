@@ -84,7 +84,7 @@ def solve_equations(
     diagonal, tied, coupled, in_common = equations.diagonal, equations.tied, equations.coupled, equations.in_common
     size, own = len(known), coupled[:, :, -1]
     sparse = kept_sparse(coupled, size)
-    whole = in_common[:size, :size].copy()
+    whole, by_common = in_common[:size, :size].copy(), None
     if size < WIDE:
         eliminate_path(diagonal, tied, coupled, *whole_columns(coupled))
         wide = coupled.reshape(-1, coupled.shape[2])
@@ -95,14 +95,15 @@ def solve_equations(
         if sparse is None:
             take_squares(coupled, ends, linear.gravity_at, in_common)
         else:
-            take_sparse_squares(sparse, diagonal, tied, coupled, in_common)
+            by_common = take_sparse_squares(sparse, diagonal, tied, coupled, in_common)
     left = InCommon(in_common[:size, :size], in_common[:size, size])
     states = (own - coupled[:, :, :size] @ left.step)[:, :, None].copy()
     substitute_path(diagonal, tied, states)
     gain = float(np.sum(own * own))
     return LinearSolution(
-        diagonal, tied, coupled[:, :, :size], left, states[:, :, 0], gain, equations.at_station, whole, sparse
-    )
+        diagonal, tied, coupled[:, :, :size], left, states[:, :, 0], gain, equations.at_station, whole, sparse,
+        by_common,
+    )  # fmt: skip
 
 
 def whole_columns(coupled: Array) -> tuple[Places, int]:
@@ -144,8 +145,10 @@ def take_squares(coupled: Array, ends: Places, tail: int, in_common: Array) -> N
         in_common[tail:, tail:] -= squares[end:, end:]
 
 
-def take_sparse_squares(sparse: Array, diagonal: Array, tied: Array, coupled: Array, in_common: Array) -> None:
+def take_sparse_squares(sparse: Array, diagonal: Array, tied: Array, coupled: Array, in_common: Array) -> Array:
     """Take C^T S^-1 C, of a C that is mostly zero, and its right side from ``in_common`` (p + 1, p + 1).
+
+    Returns -S^-1 C (s + 1, 4, p), by which it goes.
 
     Parameters
     ----------
@@ -158,6 +161,7 @@ def take_sparse_squares(sparse: Array, diagonal: Array, tied: Array, coupled: Ar
     add_squares(sparse, by_common, in_common)
     mirror_upper(in_common, size)
     in_common[:size, size] -= flat[:, :size].T @ flat[:, size]
+    return by_common
 
 
 def solve_again(

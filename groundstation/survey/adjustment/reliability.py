@@ -78,7 +78,7 @@ def measure_reliability(
     sizes : size that a blunder of a kind may have, for where it would not be found
     chance, power : of a false alarm of one test; of finding. ``chance_of_one`` of ``blunders`` is that of a whole hole
     """
-    spread = found.cofactor(weights, np.zeros((len(found.known), weights.shape[2])))
+    spread = found.spread_of(weights)
     told: dict[Hypothesis, Reliability] = {}
     for width, same in itertools.groupby(sorted(hypotheses, key=_width_of), key=_width_of):
         needed = least_noncentrality(width, chance, power)
@@ -120,15 +120,16 @@ def _of_alike(
         np.where(is_told[:, None], at_toe, np.inf),
         np.where(is_told, np.sqrt(needed / safe[:, 0]), np.inf),
     )
-    across = np.linalg.norm(effects, axis=1)
-    for one, least, unfound, by_one in zip(part, smallest.tolist(), at_toe, across, strict=True):
-        yield Reliability(one, least, unfound, _by_size(one, by_one, sizes))
+    by_size = _by_size(part, np.linalg.norm(effects, axis=1), sizes)
+    yield from map(Reliability, part, smallest.tolist(), at_toe, by_size)
 
 
-def _by_size(one: Hypothesis, by_one: Array, sizes: Mapping[BlunderKind, float]) -> Array:
-    """What a blunder of the size of its kind does to each functional (r,), by what one unit of it does."""
-    size = 1.0 if one.kind in KNOWN_SIZE else sizes.get(one.kind, np.inf)
-    return np.where(by_one > 0.0, by_one * size, 0.0) if np.isfinite(size) else np.full(len(by_one), np.inf)
+def _by_size(part: Sequence[Hypothesis], by_one: Array, sizes: Mapping[BlunderKind, float]) -> Array:
+    """What blunders of the size of their kind do to each functional (h, r), by what one unit of each does."""
+    known = {kind: 1.0 if kind in KNOWN_SIZE else sizes.get(kind, np.inf) for kind in {one.kind for one in part}}
+    size = np.array([known[one.kind] for one in part])[:, None]
+    some = np.where(by_one > 0.0, by_one, 0.0) * np.where(np.isfinite(size), size, 1.0)
+    return np.where(np.isfinite(size), some, np.inf)
 
 
 def _information(found: Adjusted, rows: Places, columns: Array) -> tuple[Array, Array]:
@@ -142,7 +143,8 @@ def _information(found: Adjusted, rows: Places, columns: Array) -> tuple[Array, 
         effect = columns[look, :, alone]
         back = np.swapaxes(effect, 1, 2)
         whole[alone] = back @ found.linear.weights[rows[look]] @ effect
-        free[alone] = back @ found.free_parts(rows[look]) @ effect
+        seen, place = np.unique(rows[look], return_inverse=True)  # with many widths the same
+        free[alone] = back @ found.free_parts(seen)[place] @ effect
     if len(others):
         touched = is_in[:, others].any(axis=1)
         whole[others], free[others] = free_information(found, rows[touched], columns[touched][:, :, others])

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.looks import Looks
 
 Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
 JOINT, MOUNT, NORTH = "joint", "mount", "north"
 
 
@@ -42,9 +43,9 @@ class TurnCauses:
         """Change (c, n) of the yaw that each look reports for one radian of each."""
         return np.asarray(self.of_tubes[:, looks.tube] + self.of_make_ups[:, looks.make_up])
 
-    def turned_by(self, place: int, looks: Looks) -> Array:
-        """The same (n,) of one of them."""
-        return np.asarray(self.of_tubes[place, looks.tube] + self.of_make_ups[place, looks.make_up])
+    def turned_by(self, places: Places, looks: Looks) -> Array:
+        """The same (h, n) of some of them."""
+        return np.asarray(self.of_tubes[places][:, looks.tube] + self.of_make_ups[places][:, looks.make_up])
 
 
 @dataclass(frozen=True, slots=True)

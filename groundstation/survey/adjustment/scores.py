@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.hypotheses import OF_BEFORE, WIDTHS, Hypothesis, effect_of
+from groundstation.survey.adjustment.blunder_kind import BlunderKind
+from groundstation.survey.adjustment.hypotheses import OF_BEFORE, WIDTHS, Hypothesis, effects_of
 from groundstation.survey.adjustment.kernels.path_elimination import reduce_right
 from groundstation.survey.adjustment.looks import Looks
 from groundstation.survey.adjustment.run_of_stops import RunOfStops
@@ -70,15 +71,14 @@ def columns_together(found: Adjusted, run: RunOfStops, part: Sequence[Hypothesis
     """Looks (r,) that hypotheses of one width q change, and the change (r, 3, h, q) of their force by each."""
     late = rows_since(found.looks, part)
     looks, linear = found.looks.part(late), replace(found.linear, jacobians=found.linear.jacobians[late])
-    effects = [effect_of(one, looks, run, found.now, linear) for one in part]
-    touched = np.zeros(len(late), bool)
-    for rows, _ in effects:
-        touched[rows] = True
-    place_of = np.cumsum(touched) - 1
-    columns = np.zeros((int(touched.sum()), 3, len(part), WIDTHS[part[0].kind]))
-    for place, (rows, effect) in enumerate(effects):
-        columns[place_of[rows], :, place] = effect
-    return late[touched], columns
+    columns = np.zeros((len(late), 3, len(part), WIDTHS[part[0].kind]))
+    by_kind: dict[BlunderKind, list[int]] = {}
+    for place, one in enumerate(part):
+        by_kind.setdefault(one.kind, []).append(place)
+    for places in by_kind.values():
+        columns[:, :, places] = effects_of([part[place] for place in places], looks, run, found.now, linear)
+    touched = columns.any(axis=(1, 2, 3))
+    return late[touched], columns[touched]
 
 
 def rows_since(looks: Looks, part: Sequence[Hypothesis]) -> Places:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.adjustment.adjusted import Adjusted
-from groundstation.survey.adjustment.looks import OF_TUBE, TURN
+from groundstation.survey.adjustment.kernels.observations import take_step
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
@@ -28,12 +28,14 @@ def leg_weights(md: Array) -> Array:
 
 def moved_looks(found: Adjusted, states: Array, common: Array, rows: Places | None = None) -> Array:
     """Change A x (n, 3, r) of all or some looks for unknowns x: states (s + 1, 4, r) and what is in common (p, r)."""
-    looks, jacobians, further = found.looks, found.linear.jacobians, found.extra.columns
+    looks, linear, further = found.looks, found.linear, found.extra.columns
+    jacobians = linear.jacobians
     if rows is not None:
         looks, jacobians, further = looks.part(rows), jacobians[rows], further[rows]
-    count = OF_TUBE * found.string.count
-    tubes = common[:count].reshape(found.string.count, OF_TUBE, -1)[looks.tube]
-    tubes[:, TURN] += common[count + 1 + looks.make_up]
-    moved = jacobians[:, :, :2] @ states[looks.station, :2] + jacobians[:, :, 2:8] @ tubes
-    moved += jacobians[:, :, 8:9] * common[count] + further @ common[found.string.width :]
-    return np.asarray(moved)
+    left, nothing = np.empty((common.shape[1], len(looks), 3)), np.zeros((len(looks), 3))
+    for place, (own, its_common) in enumerate(zip(np.moveaxis(states, 2, 0), common.T, strict=True)):
+        take_step(
+            looks.station, looks.tube, looks.make_up, jacobians, nothing, further, linear.places, linear.gravity_at,
+            np.ascontiguousarray(own), np.ascontiguousarray(its_common), left[place],
+        )  # fmt: skip
+    return np.ascontiguousarray(-np.moveaxis(left, 0, 2))

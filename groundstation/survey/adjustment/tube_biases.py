@@ -30,9 +30,8 @@ def bias_of_tube(adjusted: Adjusted, place: int) -> AdjustedBias:
     """Bias of the tube at a place of the string."""
     forces, counts = adjusted.forces_of_tubes
     x, y, z = forces[place].tolist()
-    as_bias = np.zeros((3, TILT.stop))
-    as_bias[:, :3] = np.eye(3)
-    as_bias[:, TILT] = [[0.0, z], [-z, 0.0], [y, -x]]  # what a tilt about x and about y turns the force into
-    places = OF_TUBE * place + np.arange(TILT.stop)
-    cov = as_bias @ adjusted.common_cov[np.ix_(places, places)] @ as_bias.T
+    # a bias as it is, and what a tilt about x and about y turns the force into
+    as_bias = np.array([[1.0, 0.0, 0.0, 0.0, z], [0.0, 1.0, 0.0, -z, 0.0], [0.0, 0.0, 1.0, y, -x]])
+    at = slice(OF_TUBE * place, OF_TUBE * place + TILT.stop)
+    cov = as_bias @ adjusted.common_cov[at, at] @ as_bias.T
     return AdjustedBias(as_bias @ adjusted.now.tubes[place, : TILT.stop], cov, int(counts[place]))

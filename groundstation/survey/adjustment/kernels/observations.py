@@ -177,12 +177,13 @@ def add_looks(
             for b in range(2):
                 for i in range(3):
                     own[a, b] += j[i, a] * (w[i, 0] * j[0, b] + w[i, 1] * j[1, b] + w[i, 2] * j[2, b])
+            here, x, y, z = common[a], j[0, a], j[1, a], j[2, a]
             for b in range(width + 1):
-                common[a, at[b]] += j[0, a] * weighed[0, b] + j[1, a] * weighed[1, b] + j[2, a] * weighed[2, b]
+                here[at[b]] += x * weighed[0, b] + y * weighed[1, b] + z * weighed[2, b]
         for a in range(width):
+            here, x, y, z = in_common[at[a]], rows[0, a], rows[1, a], rows[2, a]
             for b in range(a, width + 1):
-                total = rows[0, a] * weighed[0, b] + rows[1, a] * weighed[1, b] + rows[2, a] * weighed[2, b]
-                in_common[at[a], at[b]] += total
+                here[at[b]] += x * weighed[0, b] + y * weighed[1, b] + z * weighed[2, b]
     mirror_upper(in_common, right)
 
 

@@ -25,8 +25,9 @@ def add_rooted(coupled: Array, root: Array, scale: float, out: Array) -> None:
             for j in range(len(root)):
                 if coupled[k, a, j] != 0.0:
                     part = scale * coupled[k, a, j]
-                    for m in range(j, len(root)):
-                        out[k, a, m] += part * root[j, m]
+                    here, row = out[k, a, j:], root[j, j:]
+                    for m in range(len(row)):  # from a literal zero on, so that it is done with vectors
+                        here[m] += part * row[m]
 
 
 @kernel
@@ -45,5 +46,6 @@ def add_squares(coupled: Array, by_common: Array, out: Array) -> None:
             for j in range(width):
                 if coupled[k, a, j] != 0.0:
                     part = coupled[k, a, j]
-                    for m in range(j, width):
-                        out[j, m] += part * by_common[k, a, m]
+                    here, row = out[j, j:width], by_common[k, a, j:]
+                    for m in range(len(row)):
+                        here[m] += part * row[m]
