@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, SubFigure
 
 from groundstation.report.figure_words import translate_figure
-from groundstation.report.style import GREY, METADATA, SERIES, STYLE, WRONG
+from groundstation.report.style import GREY, METADATA, SERIES, STYLE, WRONG, FigureDrawnOnce
 from groundstation.report.word_tables import ENGLISH
 
 WIDTH = 6.7  # in, the text width of an A4 page
@@ -34,7 +34,7 @@ class Panel:
 def render_panels(panels: Sequence[Panel], suffix: str, language: str = ENGLISH) -> bytes:
     """Bytes of one figure with the panels below each other; ``suffix`` one of `FORMATS`; errors as ``word_table``."""
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, sum(panel.height for panel in panels)), layout="constrained")
+        figure = FigureDrawnOnce(figsize=(WIDTH, sum(panel.height for panel in panels)), layout="constrained")
         FigureCanvasAgg(figure)
         parts: Any = figure.subfigures(len(panels), 1, squeeze=False, height_ratios=[p.height for p in panels])
         for panel, part in zip(panels, parts[:, 0], strict=True):

@@ -18,6 +18,7 @@ import matplotlib
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Polygon
@@ -65,6 +66,22 @@ MOST_ELLIPSES = 60
 styled = matplotlib.rc_context(STYLE)
 
 
+class FigureDrawnOnce(Figure):
+    """A figure that is drawn once when it is saved.
+
+    matplotlib draws one with a layout engine before, without output, and then without the engine: the engine alone
+    does the same, in three quarters of the time.
+    """
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw it, or only lay it out where it is drawn for the sake of that."""
+        engine = self.get_layout_engine()
+        if isinstance(engine, ConstrainedLayoutEngine) and self.canvas.is_saving():
+            engine.execute(self)
+        else:
+            super().draw(renderer)
+
+
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure by the suffix of the file: all of it or, when anything fails, the old file stays.
 
@@ -99,7 +116,7 @@ def svg_of(figure: Figure) -> str:
 
 def new_figure(height: float, title: str) -> Figure:
     """Empty figure, ``height`` in inches; the title stands in it as it is."""
-    figure = Figure(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.06))
+    figure = FigureDrawnOnce(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.06))
     figure.suptitle(plain_text(title), x=0.01, ha="left", weight="bold")
     return figure
 

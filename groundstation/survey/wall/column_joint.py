@@ -44,10 +44,17 @@ def joint_thickness(distance: Array, radius: Array | float, other: Array | float
 
 def limit_distances(radius: Array, other: Array, required: float) -> Array:
     """Distance (m) at which the joint of two columns is as thick as required; 0 where it never can be."""
-    half = 0.25 * required**2
-    first, second = radius**2 - half, other**2 - half
-    found = np.sqrt(np.maximum(first, 0.0)) + np.sqrt(np.maximum(second, 0.0))
-    return np.where((first > 0.0) & (second > 0.0) & (radius > 0.0) & (other > 0.0), found, 0.0)
+    return limit_of_reaches(chord_reaches(radius, required), chord_reaches(other, required))
+
+
+def chord_reaches(radius: Array, required: float) -> Array:
+    """Distance (m) of a column's centre from a chord as long as required; 0 where it has none."""
+    return np.sqrt(np.where(radius > 0.0, np.maximum(radius**2 - 0.25 * required**2, 0.0), 0.0))
+
+
+def limit_of_reaches(first: Array, second: Array) -> Array:
+    """``limit_distances`` of two columns by their ``chord_reaches``."""
+    return np.where((first > 0.0) & (second > 0.0), first + second, 0.0)
 
 
 def largest_distance(radius: float, required: float) -> float:

@@ -21,6 +21,7 @@ Indices = npt.NDArray[np.intp]
 FURTHEST = 6.0  # standard deviations of a design point that is still drawn from
 BATCH = 64  # samples at the most that are drawn together
 NUMBERS = 2_000_000  # normal numbers at the most that are drawn together
+KEPT = 1_000_000  # numbers at the most by which columns are moved that are kept from sample to sample
 PLACES = 300_000  # columns times samples times depths at the most that are drawn together
 COLUMNS = 128  # at the most whose errors in planes are worked out together
 
@@ -38,6 +39,13 @@ class MostProbablePoint(NamedTuple):
     numbers: Indices
     shift: Array
     chance: float
+
+
+class Moves(NamedTuple):
+    """What each number moves columns by in all planes, (columns, numbers, 2 depths): each column's own, shared ones."""
+
+    own: Array
+    shared: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +97,20 @@ class WallErrors:
         """Index of the number that all radii in a layer share."""
         return self.shared + len(self.columns.names) * (self.own + self.layers) + layer
 
-    def drawn(self, x: Array, which: Indices) -> tuple[Array, Array]:
-        """Centres (columns, samples, depths, 2) and radii (columns, samples, depths) of some columns."""
+    def moves(self, which: Indices) -> Moves:
+        """What the numbers of some columns, and the shared ones, move them by; for ``drawn`` again and again."""
+        return Moves(_by_number(self.columns.own.at(which)), _by_number(self.columns.shared.at(which)))
+
+    def drawn(self, x: Array, which: Indices, moves: Moves | None = None) -> tuple[Array, Array]:
+        """Centres (columns, samples, depths, 2) and radii (columns, samples, depths) of some columns.
+
+        ``moves`` are theirs, where they are known already.
+        """
         c, layer = self.columns, self.columns.depth_layers()
+        own, shared = moves or self.moves(which)
         first = self.shared + self.own * which[:, None]
         mine = np.moveaxis(x[:, first + np.arange(self.own)], 1, 0)
-        moved = mine @ _by_number(c.own.at(which)) + x[:, : self.shared] @ _by_number(c.shared.at(which))
+        moved = mine @ own + x[:, : self.shared] @ shared
         centres = c.centres[which][:, None] + moved.reshape(len(which), len(x), len(c.depths), 2)
         alone = np.moveaxis(x[:, self.radius_index(0, 0) + self.layers * which[:, None] + layer], 1, 0)
         rho = c.radius_correlation

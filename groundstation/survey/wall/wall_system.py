@@ -21,12 +21,14 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.wall.as_built import Columns
-from groundstation.survey.wall.column_joint import limit_distances
+from groundstation.survey.wall.column_joint import chord_reaches, limit_distances, limit_of_reaches
 from groundstation.survey.wall.column_state import ColumnState
 from groundstation.survey.wall.void_chance import VOID_DEPTHS, near_triple, void_open, void_point
 from groundstation.survey.wall.wall_errors import (
+    KEPT,
     Mixture,
     MostProbablePoint,
+    Moves,
     WallErrors,
     add_radius,
     batch_groups,
@@ -35,6 +37,7 @@ from groundstation.survey.wall.wall_errors import (
 from groundstation.survey.wall.wall_joints import Detour, Joints
 
 Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
 SAMPLES = 8192
 FEWEST = 1024
 BUDGET = 2e8  # joints times depths times samples
@@ -187,23 +190,36 @@ class _Judge:
         voids = [[*triple, *near] for triple, near in zip(asked.triples.tolist(), asked.nearby, strict=True)]
         depths = len(errors.columns.depths)
         self._joints, self._voids = (list(batch_groups(groups, samples, depths)) for groups in (joints, voids))
+        columns = sum(len(which) for _, which in (*self._joints, *self._voids))
+        self._keeps = 2 * depths * columns * (errors.own + errors.shared) <= KEPT  # of a larger wall they are made anew
+        self._moves: dict[bytes, Moves] = {}  # of the columns of a part
+
+    def _drawn(self, x: Array, which: Indices) -> tuple[Array, Array]:
+        """Centres and radii of the columns of a part."""
+        moves = self._moves.get(which.tobytes())
+        if moves is None:
+            moves = self._errors.moves(which)
+            if self._keeps:
+                self._moves[which.tobytes()] = moves
+        return self._errors.drawn(x, which, moves)
 
     def any_open(self, x: Array) -> npt.NDArray[np.bool_]:
         """Whether anything is open in each sample (n,)."""
         found = np.zeros(len(x), bool)
         judged = np.isfinite(self._asked.probability)
         for some, which in self._joints:
-            centres, radii = self._errors.drawn(x, which)
+            centres, radii = self._drawn(x, which)
             place = self._errors.places(which)
             pairs = self._asked.pairs[some.start : some.stop]
-            thin = self._thin(centres, radii, place, pairs)
+            reaches = chord_reaches(radii, self._required)
+            thin = self._thin(centres, reaches, place, pairs)
             for k, ways in enumerate(self._asked.ways[some.start : some.stop]):
                 for way in ways:
                     if np.any(thin[k]):
-                        thin[k] &= np.any(self._thin(centres, radii, place, np.array(way)), axis=0)
+                        thin[k] &= np.any(self._thin(centres, reaches, place, np.array(way)), axis=0)
             found |= np.any(thin & judged[some.start : some.stop, None], axis=(0, 2))
         for some, which in self._voids:
-            centres, radii = self._errors.drawn(x, which)
+            centres, radii = self._drawn(x, which)
             place = self._errors.places(which)
             for k in some:
                 three, others = place[self._asked.triples[k]], place[self._asked.nearby[k]]
@@ -211,12 +227,15 @@ class _Judge:
         return found
 
     def _thin(
-        self, centres: Array, radii: Array, place: npt.NDArray[np.intp], pairs: npt.NDArray[np.intp]
+        self, centres: Array, reaches: Array, place: npt.NDArray[np.intp], pairs: npt.NDArray[np.intp]
     ) -> npt.NDArray[np.bool_]:
-        """Whether joints are too thin or not there (joints, samples, depths); ``place`` of columns in what is drawn."""
+        """Whether joints are too thin or not there (joints, samples, depths); ``place`` of columns in what is drawn.
+
+        ``reaches`` are the ``chord_reaches`` of their radii.
+        """
         a, b = place[pairs[:, 0]], place[pairs[:, 1]]
         apart = centres[b] - centres[a]
         with np.errstate(invalid="ignore"):
-            thick = np.hypot(apart[..., 0], apart[..., 1]) <= limit_distances(radii[a], radii[b], self._required)
+            thick = np.hypot(apart[..., 0], apart[..., 1]) <= limit_of_reaches(reaches[a], reaches[b])
         stands = np.all(self._errors.columns.states[pairs] <= ColumnState.UNSURVEYED, axis=1)
         return np.asarray(~(thick & stands[:, None]))

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-import scipy.signal
 
 from groundstation.calibration.allan_analysis import analyse_allan_deviation
 from groundstation.calibration.bias_model import FilterNoise, drift_std, fit_bias_model, seen_drift
@@ -15,11 +14,13 @@ SPANS = (60.0, 300.0, 900.0)
 
 def sensor(count: int, white: float, bias: float, tau: float, seed: int) -> np.ndarray:
     """Readings of a sensor: white noise and a Gauss-Markov bias, exact at every step."""
+    from scipy.signal import lfilter  # a second, of everybody who collects the tests
+
     random = np.random.default_rng(seed)
     keep = math.exp(-1.0 / (RATE * tau))
     driven = random.standard_normal(count) * bias * math.sqrt(1.0 - keep**2)
     driven[0] = bias * random.standard_normal()
-    return scipy.signal.lfilter([1.0], [1.0, -keep], driven) + white * math.sqrt(RATE) * random.standard_normal(count)
+    return lfilter([1.0], [1.0, -keep], driven) + white * math.sqrt(RATE) * random.standard_normal(count)
 
 
 def fitted(record: np.ndarray) -> FilterNoise:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -35,10 +36,11 @@ def laid_down(rests: int = 24, seed: int = 1, spread: float = 1.0) -> np.ndarray
         axis, angle = random.standard_normal(3), spread * random.uniform(0.8, 2.5)
         steps = round(RATE * 1.5)
         speed = angle * (1.0 - np.cos(2.0 * np.pi * (np.arange(steps) + 0.5) / steps)) * RATE / steps
-        for one in speed[:, None] * axis / np.linalg.norm(axis):
-            pose = pose * Rotation.from_rotvec(one / RATE)
-            rates.append(one)
-            forces.append(pose.inv().apply([0.0, 0.0, G]) + 0.3 * random.standard_normal(3))
+        turning = speed[:, None] * axis / np.linalg.norm(axis)
+        poses = pose * Rotation.from_rotvec(np.cumsum(turning, axis=0) / RATE)
+        rates.extend(turning)
+        forces.extend(poses.inv().apply([0.0, 0.0, G]) + 0.3 * random.standard_normal((steps, 3)))
+        pose = poses[-1]
     read = np.array(rates) @ GYROSCOPE.T + RATE_BIAS + 0.002 * random.standard_normal((len(rates), 3))
     felt = np.array(forces) @ ACCELEROMETER.T + FORCE_BIAS + 0.02 * random.standard_normal((len(rates), 3))
     return np.column_stack([np.arange(len(rates)) / RATE, read, felt])
@@ -176,18 +178,21 @@ def test_a_bias_is_no_motion_and_a_steady_turn_is_no_rest(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("rows", "says"),
+    ("lay", "says"),
     [
-        (laid_down(rests=8), r"rests\.npy: rests: expected 12 or more at different attitudes, got 8"),
-        (laid_down(spread=0.02), r"expected attitudes that tell nine parameters apart"),
-        (laid_down()[:90], r"expected 100 rows or more, got 90"),
-        (laid_down()[:, [0, 1, 2, 3, 4, 4, 4]] * np.array([1, 1, 1, 1, 1, 0.1, 3]), "refused by|expected attitudes"),
+        (lambda: laid_down(rests=8), r"rests\.npy: rests: expected 12 or more at different attitudes, got 8"),
+        (lambda: laid_down(spread=0.02), r"expected attitudes that tell nine parameters apart"),
+        (lambda: laid_down()[:90], r"expected 100 rows or more, got 90"),
+        (
+            lambda: laid_down()[:, [0, 1, 2, 3, 4, 4, 4]] * np.array([1, 1, 1, 1, 1, 0.1, 3]),
+            "refused by|expected attitudes",
+        ),
     ],
     ids=["few", "alike", "short", "no gravity"],
 )
-def test_what_gives_no_calibration_is_refused_by_name(tmp_path: Path, rows: np.ndarray, says: str) -> None:
+def test_what_gives_no_calibration_is_refused_by_name(tmp_path: Path, lay: Callable[[], np.ndarray], says: str) -> None:
     with pytest.raises(CalibrationError, match=says):
-        calibrated(tmp_path, rows)
+        calibrated(tmp_path, lay())
 
 
 def test_a_record_in_g_that_says_so_not_is_refused(tmp_path: Path) -> None:
