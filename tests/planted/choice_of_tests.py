@@ -33,9 +33,16 @@ GATEWAY, LEASED, KEPT, CALIBRATED, STRING, *SETUP = (
 PAGE = ("groundstation/test_page_rooms_by_hand.py", "groundstation/test_page_papers_by_hand.py")
 SEEDED = ("sim/test_seeded_worlds.py",)
 SMALL = ("test_small_doors_by_hand.py",)
+OF_COMMANDS, OF_DRILLING, OF_GROUND, OF_RIGS, OF_STUDIES = (
+    f"test_{name}_called_by_hand.py" for name in ("commands", "drilling", "ground", "rigs", "studies")
+)
 WHOLE = {  # tests that look at a whole room: without importing it, or from a folder of which none is chosen
     "benchmarks/": ("test_benches_by_hand.py", "test_benches_of_rigs_by_hand.py", *SMALL),
-    "borechain/cli/rig/": SMALL,
+    **{f"borechain/cli/{room}": (OF_COMMANDS,) for room in ("calibrate/", "campaign/", "whole_files")},
+    **{f"borechain/cli/{room}/": (OF_STUDIES,) for room in ("experiment", "firmware", "gauntlet")},
+    "borechain/cli/ground/": (OF_GROUND,),
+    "borechain/cli/rig/": (*SMALL, OF_RIGS, OF_DRILLING),
+    "borechain/drilling/": (OF_DRILLING,),
     "borechain/cli/": ("test_options_whole.py", "test_command_edges_by_hand.py"),
     "borechain/gauntlet/": ("gauntlet/test_oracles_by_hand.py", "gauntlet/test_wellness_by_hand.py", *SMALL),
     "borechain/studies/": ("studies/test_studies_whole.py", "studies/test_set_up_study_whole.py"),

@@ -1,7 +1,8 @@
-"""A stub that notes what it is given, in the place of what computes."""
+"""Stubs that note what they are given, in the place of what computes."""
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import pytest
@@ -19,3 +20,15 @@ def instead(monkeypatch: pytest.MonkeyPatch, place: str, found: Any) -> Given:
 
     monkeypatch.setattr(place, answer)
     return given
+
+
+def noted(told: Given, *words: Any) -> Any:
+    """Return a context that says when it begins and when it ends."""
+
+    @contextlib.contextmanager
+    def one(*given: Any, **named: Any) -> Any:
+        told.append((*words, "begins", *given, *((named,) if named else ())))
+        yield words[0]
+        told.append((*words, "ends"))
+
+    return one
