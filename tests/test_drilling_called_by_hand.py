@@ -159,7 +159,7 @@ def test_a_rig_has_a_link_and_tubes_on_chips_are_of_the_string(monkeypatch: pyte
     for said, chosen in (("", set()), ("all", {1, 2, 3}), ("1,3", {1, 3}), (" 2 ", {2})):
         assert drill_hole.tubes_on_chips(said, 3) == chosen
     assert made == ["a program"] * 3
-    for said in ("0", "4", "1,1", "1,x", ",", "1,,2"):
+    for said in ("0", "4", "1,4", "1,1", "1,x", ",", "1,,2"):
         with pytest.raises(
             RigError, match=f"^--chip {said}: expected all, or numbers of tubes from 1 to 3 with commas$"
         ):

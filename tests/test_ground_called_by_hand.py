@@ -48,10 +48,10 @@ def test_the_crew_opens_its_screen_under_its_name(monkeypatch: pytest.MonkeyPatc
     assert told[5] == ("ground", "rig-2", "bert")
     for error in (OSError, KeyError):
 
-        def nobody(error: Any = error) -> str:
+        def nameless(error: Any = error) -> str:
             raise error
 
-        monkeypatch.setattr(crew.getpass, "getuser", nobody)
+        monkeypatch.setattr(crew.getpass, "getuser", nameless)
         assert crew.user_name() == "crew"
 
 
@@ -233,11 +233,11 @@ def test_a_router_is_tried_until_the_wait_is_over(
     def open_client(_endpoint: str, timeout: float, _credentials: Any) -> Any:
         tried.append(timeout)
         now[0] += timeout
-        raise MediumError("nobody")
+        raise MediumError("no router")
 
     monkeypatch.setattr(record_command, "time", SimpleNamespace(monotonic=lambda: now[0]))
     monkeypatch.setattr("telemetry.media.zenoh_bus.open_client", open_client)
-    with pytest.raises(MediumError, match="nobody"), record_command.patient_client("tcp/h:1", wait, None):
+    with pytest.raises(MediumError, match="no router"), record_command.patient_client("tcp/h:1", wait, None):
         pass
     assert tried == [each] * tries
     monkeypatch.setattr("telemetry.media.zenoh_bus.open_client", lambda *_: contextlib.nullcontext("bus"))
