@@ -25,7 +25,11 @@ UNDRAWN_GROUND, UNDRAWN_LINK, UNDRAWN_NODE = (
     "groundstation/test_undrawn_rooms_by_hand.py", "telemetry/test_undrawn_rooms_of_the_link.py",
     "node/test_undrawn_rooms_of_a_node.py",
 )  # fmt: skip
-OF_NODES = tuple(f"node/test_{name}.py" for name in ("options_by_hand", "told_by_hand", "board_by_hand"))
+OF_NODES = tuple(
+    f"node/test_{name}_by_hand.py" for name in ("options", "told", "board", "cycle_of_a_process", "edges_of_a_process")
+)
+OF_INTAKE = ("groundstation/test_intake_by_hand.py", "groundstation/test_learnt_by_hand.py")
+OF_BLOCKS = ("node/chip/test_blocks_by_hand.py",)
 GATEWAY, LEASED, KEPT, CALIBRATED, STRING, *SETUP = (
     f"groundstation/test_{name}_by_hand.py"
     for name in ("gateway", "leased", "kept", "recalibration", "string", "setup", "setup_told", "setup_costs")
@@ -50,6 +54,7 @@ WHOLE = {  # tests that look at a whole room: without importing it, or from a fo
     "node/firmware/": ("node/test_seeded_nodes.py",),
     "node/kernels/": ("node/test_seeded_nodes.py",),
     "node/process/": (UNDRAWN_NODE, *OF_NODES, "test_seeded_rigs.py"),
+    "node/translation/chip_blocks": OF_BLOCKS,
     "node/translation/c_": ("node/chip/test_translated_forms.py",),
     "telemetry/application/end": ("telemetry/test_endpoint_by_hand.py", "telemetry/test_mail_by_hand.py"),
     "telemetry/application/": (UNDRAWN_LINK, "test_seeded_rigs.py"),
@@ -77,7 +82,7 @@ WHOLE = {  # tests that look at a whole room: without importing it, or from a fo
     "groundstation/service/orders/recalibration/": (CALIBRATED,),
     "groundstation/service/setup/": tuple(SETUP),
     "groundstation/service/hole/collar": (UNDRAWN_GROUND,),
-    "groundstation/service/process/": (UNDRAWN_GROUND,),
+    "groundstation/service/process/": (*OF_INTAKE, UNDRAWN_GROUND),
     "groundstation/service/string/": (STRING, "groundstation/test_depth_by_hand.py", UNDRAWN_GROUND),
     "groundstation/service/": (STATIONS,),
     "groundstation/survey/adjustment/": (STATIONS,),
