@@ -21,6 +21,7 @@ CALIBRATIONS, PAPERS, STATIONS, WALLS = (
     for name in ("calibration/test_calibrations", "test_papers", "test_stations", "test_walls")
 )
 DAMAGED, SURVEYS = (f"groundstation/survey/test_{name}_whole.py" for name in ("damaged_files", "surveys"))
+OF_JOINTS = ("telemetry/test_end_of_a_joint_by_hand.py",)
 UNDRAWN_GROUND, UNDRAWN_LINK, UNDRAWN_NODE = (
     "groundstation/test_undrawn_rooms_by_hand.py", "telemetry/test_undrawn_rooms_of_the_link.py",
     "node/test_undrawn_rooms_of_a_node.py",
@@ -37,17 +38,20 @@ GATEWAY, LEASED, KEPT, CALIBRATED, STRING, *SETUP = (
 PAGE = ("groundstation/test_page_rooms_by_hand.py", "groundstation/test_page_papers_by_hand.py")
 SEEDED = ("sim/test_seeded_worlds.py",)
 SMALL = ("test_small_doors_by_hand.py",)
-OF_COMMANDS, OF_DRILLING, OF_GROUND, OF_RIGS, OF_STUDIES = (
-    f"test_{name}_called_by_hand.py" for name in ("commands", "drilling", "ground", "rigs", "studies")
+OF_ANSWERS, OF_CLIENT, OF_COMMANDS, OF_DRILLING, OF_GROUND, OF_RIGS, OF_STUDIES = (
+    f"test_{name}_called_by_hand.py"
+    for name in ("answers", "client", "commands", "drilling", "ground", "rigs", "studies")
 )
 WHOLE = {  # tests that look at a whole room: without importing it, or from a folder of which none is chosen
     "benchmarks/": ("test_benches_by_hand.py", "test_benches_of_rigs_by_hand.py", *SMALL),
     **{f"borechain/cli/{room}": (OF_COMMANDS,) for room in ("calibrate/", "campaign/", "whole_files")},
     **{f"borechain/cli/{room}/": (OF_STUDIES,) for room in ("experiment", "firmware", "gauntlet")},
+    **{f"borechain/{room}": (OF_CLIENT,) for room in ("__main__", "api", "client", "rig_search")},
     "borechain/cli/ground/": (OF_GROUND,),
     "borechain/cli/rig/": (*SMALL, OF_RIGS, OF_DRILLING),
     "borechain/drilling/": (OF_DRILLING,),
     "borechain/cli/": ("test_options_whole.py", "test_command_edges_by_hand.py"),
+    **{f"borechain/cli/{room}/": (OF_ANSWERS,) for room in ("export", "link", "pki", "survey")},
     "borechain/gauntlet/": ("gauntlet/test_oracles_by_hand.py", "gauntlet/test_wellness_by_hand.py", *SMALL),
     "borechain/studies/": ("studies/test_studies_whole.py", "studies/test_set_up_study_whole.py"),
     "node/__main__": SMALL,
@@ -58,7 +62,9 @@ WHOLE = {  # tests that look at a whole room: without importing it, or from a fo
     "node/translation/c_": ("node/chip/test_translated_forms.py",),
     "telemetry/application/end": ("telemetry/test_endpoint_by_hand.py", "telemetry/test_mail_by_hand.py"),
     "telemetry/application/": (UNDRAWN_LINK, "test_seeded_rigs.py"),
-    "telemetry/media/can_": ("telemetry/test_whole_wire.py",),
+    "telemetry/media/can_": ("telemetry/test_whole_wire.py", *OF_JOINTS),
+    "telemetry/media/chip_bridge": OF_JOINTS,
+    "telemetry/runtime/disk": OF_JOINTS,
     "telemetry/media/memory": (UNDRAWN_LINK,),
     "telemetry/media/isotp.py": ("telemetry/test_whole_wire.py",),
     "telemetry/media/send_queue.py": ("telemetry/test_whole_wire.py",),
