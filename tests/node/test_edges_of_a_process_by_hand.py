@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import astuple
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,9 +14,10 @@ import pytest
 from noted_parts import NotedPart, bare
 
 from node.errors import SensorCause, SensorError
+from node.firmware import chip_node
 from node.process import reading, tube_process
 from node.process.block_updater import BlockUpdater
-from node.process.drivers import frame_clock, gpio_lines
+from node.process.drivers import frame_clock, gpio_lines, vn100
 from node.process.drivers.frame_clock import FrameClock, is_moved
 from node.process.saver import Saver
 from telemetry.messages import Severity
@@ -179,3 +181,70 @@ def test_what_a_disk_refused_is_told_once_until_it_takes_something_again(tmp_pat
         assert said == [(Severity.ERROR, "state_not_saved", {"detail": "x" * 200})] * told
         assert saver.is_refused is (save is refuse)
     assert tube_process.MAX_CLOCK_STD == 3600.0
+
+
+def test_what_is_sent_at_once_has_its_bound() -> None:
+    assert tube_process.RESENT_TOGETHER == 64
+
+
+# a sensor on a line, and an emulated chip
+
+
+@pytest.mark.parametrize(("reads", "spread"), [(15, 0.2), (16, 1e-3), (17, 1e-3)])
+def test_a_crystal_is_known_from_sixteen_reads_on(reads: int, spread: float) -> None:
+    clock = FrameClock(50.0)
+    for k in range(1, reads + 1):
+        clock.on_read(0.5 * k + 0.01, 25)
+        assert clock._spread == (0.2 if k < 16 else 1e-3)
+    assert clock._spread == spread
+
+
+def test_a_line_that_is_gone_or_says_other_things_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def told(text: str) -> bytes:
+        check = 0
+        for byte in text.encode():
+            check ^= byte
+        return f"${text}*{check:02X}\r\n".encode()
+
+    waiting: Noted = [told("VNYMR,1,2"), told("VNWRG,06,19") + told("VNIMU,1"), OSError(5, "Input/output error")]
+
+    def read_waiting(_file: int, _follows: float) -> bytes:
+        found = waiting.pop(0)
+        if isinstance(found, Exception):
+            raise found
+        return bytes(found)
+
+    monkeypatch.setattr(vn100, "read_waiting", read_waiting)
+    line = bare(vn100.Vn100, _file=7, _path=Path("tty"), _rest=b"", _fresh=True, dropped=0)
+    for said in (
+        r"^vn100: tty: expected lines \$VNIMU, got \$VNYMR$", r"^vn100: tty: expected about 25 lines, got 0$",
+        r"^vn100: tty: Input/output error: the line is gone$",
+    ):  # fmt: skip
+        with pytest.raises(SensorError, match=said):
+            line.read(1.0, 1.0 + 25.0 / vn100.RATE)
+    line._file = -1
+    with pytest.raises(SensorError, match=r"^vn100: tty: not started$"):
+        line.read(1.0, 1.5)
+
+
+def test_an_emulated_chip_is_told_by_kind_and_length_and_answers_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two pipes of its folder, which end with it; requests are a kind, a length and so many bytes, little-endian."""
+    begun: Noted = []
+    process = SimpleNamespace(poll=lambda: None, kill=lambda: begun.append("killed"), wait=lambda: None)
+    monkeypatch.setattr(chip_node, "chip_program", lambda: "a program")
+    monkeypatch.setattr(chip_node, "start_chip", lambda *given: begun.append(given) or process)
+    chip = chip_node.EmulatedChip()
+    (program, folder), *_ = begun
+    assert program == "a program"
+    assert sorted(path.name for path in folder.iterdir()) == ["from_chip", "to_chip"]
+    chip.put(3, b"body")
+    assert os.read(chip._to, 100) == b"\x03\0\0\0\x04\0\0\0body"
+    monkeypatch.setattr(chip_node, "ANSWER", 6)
+    os.write(chip._from, b"answer")
+    assert chip.answer() == b"answer"
+    process.poll = lambda: 3
+    with pytest.raises(chip_node.ChipError, match=r"it has ended with status 3$"):
+        chip.put(3, b"body")
+    chip._end()
+    assert begun[1:] == ["killed"]
+    assert not folder.exists()

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import socket
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from telemetry.application import arguments
+from telemetry.application.commands import COMMANDS
+from telemetry.errors import CommandError
 from telemetry.media import can_exchange, chip_bridge
 from telemetry.media.can_exchange import (
     ACKNOWLEDGE_LIMIT,
@@ -28,8 +32,11 @@ from telemetry.media.can_timing import BitRates
 from telemetry.media.chip_bridge import ChipBridge
 from telemetry.media.port import PortFrame, Priority
 from telemetry.media.send_queue import SendQueue
+from telemetry.messages import NodeFlag
 from telemetry.presentation.can_native import Split
+from telemetry.quantities import ValueKind
 from telemetry.runtime.disk import MachineDisk
+from telemetry.runtime.step_stream import StepStream
 
 Noted = list[Any]
 
@@ -285,3 +292,42 @@ def test_a_disk_reads_from_an_offset_writes_in_place_and_makes_what_is_not_there
     for call in (disk.read, disk.force, disk.remove):
         with pytest.raises(FileNotFoundError):
             call(file)
+
+
+# streams, flags and arguments
+
+
+def test_what_a_stream_brought_before_its_end_is_taken_and_then_its_end() -> None:
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        stream = StepStream(ours)
+        theirs.sendall(b"\0\0\0\x03abc\0\0")
+        assert stream.arrived() == [b"abc"]
+        theirs.sendall(b"\0")
+        assert stream.arrived() == []  # a part of a length, and it is alive
+        theirs.sendall(b"\x02de\0\0\0\x01f")
+        assert stream.arrived() == [b"de", b"f"]
+        theirs.close()
+        assert stream.arrived() is None
+
+
+def test_flags_of_a_node_are_a_bit_each_in_the_order_of_the_wire() -> None:
+    assert [flag.value for flag in NodeFlag] == [1 << k for k in range(11)]
+    names = "YAW_UNTRUSTED AIDING_OLD INNOVATION_REJECTED RATE_EXCEEDED RESTORED CLOCK_UNSYNCHRONISED BIAS_UNKNOWN"
+    assert [flag.name for flag in NodeFlag] == [
+        *names.split(),
+        "SENSOR_FAULT",
+        "NOT_SAVED",
+        "DRIVE_UNTOLD",
+        "LOWER_UNTOLD",
+    ]
+
+
+def test_whole_numbers_of_orders_are_checked_by_their_quantity() -> None:
+    kinds = [one for spec in COMMANDS for one in spec.arguments if one.quantity.kind is ValueKind.INTEGER]
+    assert len(kinds) >= 2
+    for argument in kinds:
+        low = int(argument.quantity.low)
+        assert arguments._check(argument, low) == low
+        with pytest.raises(CommandError, match=argument.quantity.name):
+            arguments._check(argument, low - 1)
