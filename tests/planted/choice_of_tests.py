@@ -21,11 +21,16 @@ CALIBRATIONS, PAPERS, STATIONS, WALLS = (
     for name in ("calibration/test_calibrations", "test_papers", "test_stations", "test_walls")
 )
 DAMAGED, SURVEYS = (f"groundstation/survey/test_{name}_whole.py" for name in ("damaged_files", "surveys"))
+OF_JOINTS = ("telemetry/test_end_of_a_joint_by_hand.py",)
 UNDRAWN_GROUND, UNDRAWN_LINK, UNDRAWN_NODE = (
     "groundstation/test_undrawn_rooms_by_hand.py", "telemetry/test_undrawn_rooms_of_the_link.py",
     "node/test_undrawn_rooms_of_a_node.py",
 )  # fmt: skip
-OF_NODES = tuple(f"node/test_{name}.py" for name in ("options_by_hand", "told_by_hand", "board_by_hand"))
+OF_NODES = tuple(
+    f"node/test_{name}_by_hand.py" for name in ("options", "told", "board", "cycle_of_a_process", "edges_of_a_process")
+)
+OF_INTAKE = ("groundstation/test_intake_by_hand.py", "groundstation/test_learnt_by_hand.py")
+OF_BLOCKS = ("node/chip/test_blocks_by_hand.py",)
 GATEWAY, LEASED, KEPT, CALIBRATED, STRING, *SETUP = (
     f"groundstation/test_{name}_by_hand.py"
     for name in ("gateway", "leased", "kept", "recalibration", "string", "setup", "setup_told", "setup_costs")
@@ -33,20 +38,33 @@ GATEWAY, LEASED, KEPT, CALIBRATED, STRING, *SETUP = (
 PAGE = ("groundstation/test_page_rooms_by_hand.py", "groundstation/test_page_papers_by_hand.py")
 SEEDED = ("sim/test_seeded_worlds.py",)
 SMALL = ("test_small_doors_by_hand.py",)
+OF_ANSWERS, OF_CLIENT, OF_COMMANDS, OF_DRILLING, OF_GROUND, OF_RIGS, OF_STUDIES = (
+    f"test_{name}_called_by_hand.py"
+    for name in ("answers", "client", "commands", "drilling", "ground", "rigs", "studies")
+)
 WHOLE = {  # tests that look at a whole room: without importing it, or from a folder of which none is chosen
     "benchmarks/": ("test_benches_by_hand.py", "test_benches_of_rigs_by_hand.py", *SMALL),
-    "borechain/cli/rig/": SMALL,
+    **{f"borechain/cli/{room}": (OF_COMMANDS,) for room in ("calibrate/", "campaign/", "whole_files")},
+    **{f"borechain/cli/{room}/": (OF_STUDIES,) for room in ("experiment", "firmware", "gauntlet")},
+    **{f"borechain/{room}": (OF_CLIENT,) for room in ("__main__", "api", "client", "rig_search")},
+    "borechain/cli/ground/": (OF_GROUND,),
+    "borechain/cli/rig/": (*SMALL, OF_RIGS, OF_DRILLING),
+    "borechain/drilling/": (OF_DRILLING,),
     "borechain/cli/": ("test_options_whole.py", "test_command_edges_by_hand.py"),
+    **{f"borechain/cli/{room}/": (OF_ANSWERS,) for room in ("export", "link", "pki", "survey")},
     "borechain/gauntlet/": ("gauntlet/test_oracles_by_hand.py", "gauntlet/test_wellness_by_hand.py", *SMALL),
     "borechain/studies/": ("studies/test_studies_whole.py", "studies/test_set_up_study_whole.py"),
     "node/__main__": SMALL,
     "node/firmware/": ("node/test_seeded_nodes.py",),
     "node/kernels/": ("node/test_seeded_nodes.py",),
     "node/process/": (UNDRAWN_NODE, *OF_NODES, "test_seeded_rigs.py"),
+    "node/translation/chip_blocks": OF_BLOCKS,
     "node/translation/c_": ("node/chip/test_translated_forms.py",),
     "telemetry/application/end": ("telemetry/test_endpoint_by_hand.py", "telemetry/test_mail_by_hand.py"),
     "telemetry/application/": (UNDRAWN_LINK, "test_seeded_rigs.py"),
-    "telemetry/media/can_": ("telemetry/test_whole_wire.py",),
+    "telemetry/media/can_": ("telemetry/test_whole_wire.py", *OF_JOINTS),
+    "telemetry/media/chip_bridge": OF_JOINTS,
+    "telemetry/runtime/disk": OF_JOINTS,
     "telemetry/media/memory": (UNDRAWN_LINK,),
     "telemetry/media/isotp.py": ("telemetry/test_whole_wire.py",),
     "telemetry/media/send_queue.py": ("telemetry/test_whole_wire.py",),
@@ -70,7 +88,7 @@ WHOLE = {  # tests that look at a whole room: without importing it, or from a fo
     "groundstation/service/orders/recalibration/": (CALIBRATED,),
     "groundstation/service/setup/": tuple(SETUP),
     "groundstation/service/hole/collar": (UNDRAWN_GROUND,),
-    "groundstation/service/process/": (UNDRAWN_GROUND,),
+    "groundstation/service/process/": (*OF_INTAKE, UNDRAWN_GROUND),
     "groundstation/service/string/": (STRING, "groundstation/test_depth_by_hand.py", UNDRAWN_GROUND),
     "groundstation/service/": (STATIONS,),
     "groundstation/survey/adjustment/": (STATIONS,),

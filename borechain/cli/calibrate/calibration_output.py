@@ -143,16 +143,20 @@ def rendered_files(outcome: CalibrationOutcome, wanted: WantedFiles, day: dateti
 def write_files_whole(files: dict[Path, bytes]) -> None:
     """Write drafts of all files and rename them only when every one is on the disk."""
     drafts = {path: path.with_name(f".{path.name}.{os.getpid()}.draft") for path in files}
+    landed: list[str] = []
+    for_whom = Path()
     try:
-        for path, content in files.items():
-            with drafts[path].open("wb") as file:
+        for for_whom, content in files.items():
+            with drafts[for_whom].open("wb") as file:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
-        for path, draft in drafts.items():
-            draft.replace(path)
+        for for_whom, draft in drafts.items():
+            draft.replace(for_whom)
+            landed.append(str(for_whom))
     except OSError as error:
-        raise EnvironmentFault(f"{error.filename}: {error.strerror}; nothing was written") from error
+        told = f"of the files {', '.join(landed)} was written" if landed else "nothing was written"
+        raise EnvironmentFault(f"{for_whom}: {error.strerror}; {told}") from error
     finally:
         for draft in drafts.values():
             with contextlib.suppress(OSError):
