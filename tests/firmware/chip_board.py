@@ -6,6 +6,7 @@ import contextlib
 import re
 import struct
 import subprocess
+import tempfile
 import threading
 import time
 import tty
@@ -151,10 +152,12 @@ class EmulatedTube:
         self, program: Path, flash: TubeFlash, hub: CanHub, segments: tuple[str, str], recording: Path
     ) -> None:
         self._stack = contextlib.ExitStack()
+        self.monitor = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="chip-"))) / "monitor"
         backend = f"memory-backend-file,id=flash,size={FLASH_SIZE},mem-path={flash.path},share=on"
         self._process = subprocess.Popen(
             ["qemu-system-arm", "-M", "mps2-an386,memory-backend=flash", "-object", backend, "-display", "none",
-             "-monitor", "none", "-serial", "pty", "-serial", "pty", "-serial", "pty", "-kernel", str(program)],
+             "-monitor", "none", "-qmp", f"unix:{self.monitor},server=on,wait=off",
+             "-serial", "pty", "-serial", "pty", "-serial", "pty", "-kernel", str(program)],
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         )  # fmt: skip
         lines = [self._told_line() for _ in range(3)]

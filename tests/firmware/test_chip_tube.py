@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 from chip_board import PATIENCE, EmulatedTube, TubeFlash, build_tube, sizes_of
+from chip_stack import stack_region, stack_used
 from forked_commands import Command as Forked
 from needed_programs import needs
 from own_clock_surface import Surface, living
@@ -57,6 +58,7 @@ MINUTES = float(os.environ.get("BORECHAIN_CHIP_MINUTES", "2"))
 RATE_DPS = 71.0
 WORDS_UNTIL_CUT = 700  # of flash: within the content of a save
 FLASH, MEMORY = 192 * 1024, 32 * 1024
+STACK, LEAST_USED, SPARE = 3072, 1024, 256  # bytes; a step alone takes more than the least, and a guard stays unused
 NOW = datetime.datetime.now(datetime.UTC)
 BLOCK_KEY = bytes(range(32))
 BLOCK = ParameterBlock(CHIP, 1, accelerometer=SensorParameters(bias=(1e-3, 0.0, -1e-3)))  # its bias stays known
@@ -89,7 +91,7 @@ class String:
     """Encoder, a tube in Python, the chip, another tube in Python; each joint a segment of CAN."""
 
     def __init__(self, folder: Path, endpoint: str, hub: CanHub, program: Path, keys: Path | None) -> None:
-        self.folder, self.endpoint, self._hub, self._program, self._keys = folder, endpoint, hub, program, keys
+        self.folder, self.endpoint, self._hub, self.program, self._keys = folder, endpoint, hub, program, keys
         self.world = world_of(time.monotonic())
         record_sensors(self.world, folder)
         told = self.world.tube_settings(CHIP)
@@ -98,6 +100,7 @@ class String:
         self.flash = TubeFlash(folder / "flash.bin", own, folder, BLOCK_KEY, page)
         self.running: dict[str, Forked] = {}
         self._chip: EmulatedTube | None = None
+        self.stack_used: list[int] = []  # bytes, of every life of the chip
 
     def joint(self, upper: str, lower: str) -> str:
         return f"can:{self._hub.port}/{RIG}/{upper}-{lower},interface=borechain_loopback,frames=fd,profile=native"
@@ -129,10 +132,11 @@ class String:
 
     def start_chip(self) -> None:
         segments = f"{RIG}/{ABOVE}-{CHIP}", f"{RIG}/{CHIP}-{BELOW}"
-        self._chip = EmulatedTube(self._program, self.flash, self._hub, segments, self.folder / f"tube-{CHIP}.npy")
+        self._chip = EmulatedTube(self.program, self.flash, self._hub, segments, self.folder / f"tube-{CHIP}.npy")
 
     def cut_chip(self) -> None:
         if self._chip is not None:
+            self.stack_used.append(stack_used(self._chip.monitor, self.program))
             self._chip.kill()
             self._chip = None
 
@@ -197,6 +201,10 @@ def test_a_chip_between_two_tubes_loses_nothing_and_says_nothing_wrong(
         number += 2
     state = surface.first(NodeState, lambda s: s.tube == CHIP)
     assert (state.parameters_version, state.parameters_hash) == (1, BLOCK.sha256()[:8])  # over every cut
+    string.cut_chip()
+    room = stack_region(string.program)[1]
+    assert room >= STACK
+    assert LEAST_USED < max(string.stack_used) < room - SPARE, string.stack_used
     judge_all(surface, string)
 
 
