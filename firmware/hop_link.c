@@ -82,18 +82,24 @@ static bool is_of_before(const struct hop_link *link, uint64_t epoch)
            since > 0u && since <= SESSION_MASK >> 1;
 }
 
+/* Our numbers begin anew: what waits is sent again. */
+static void restart(struct hop_link *link)
+{
+    uint32_t k;
+    link->session++;
+    name_session(link);
+    for (k = 0u; k < link->count; k++) {
+        link->slots[k].number = 0u;
+    }
+}
+
 /* Another process at the other end: its numbers and ours begin anew. Its new session: its numbers do. */
 static void follow_peer(struct hop_link *link, uint64_t sender, uint64_t epoch)
 {
     const bool is_other = !link->has_peer || sender != link->peer_sender ||
                           epoch >> BOOT_SHIFT != link->peer_epoch >> BOOT_SHIFT;
-    uint32_t k;
     if (is_other && link->has_peer) {
-        link->session++;
-        name_session(link);
-        for (k = 0u; k < link->count; k++) {
-            link->slots[k].number = 0u;
-        }
+        restart(link);
     }
     if (is_other || epoch != link->peer_epoch) {
         link->received = 0u;
@@ -130,6 +136,19 @@ static void drop_acknowledged(struct hop_link *link, const struct link_header *h
     link->count = kept;
 }
 
+/* Whether the other end lacks what it acknowledged before: it met another meanwhile. */
+static bool has_forgotten(const struct hop_link *link, const struct link_header *header)
+{
+    uint64_t oldest = link->next_number;
+    uint32_t k;
+    for (k = 0u; k < link->count; k++) {
+        if (link->slots[k].number > 0u && link->slots[k].number < oldest) {
+            oldest = link->slots[k].number;
+        }
+    }
+    return header->acknowledged + 1u < oldest;
+}
+
 static bool is_new(struct hop_link *link, uint64_t number, uint32_t now_ms)
 {
     uint64_t ahead;
@@ -164,16 +183,21 @@ enum link_answer link_receive(
     struct link_entries entries;
     struct link_entry entry;
     bool is_known;
+    bool is_new_session;
     if (!link_parse(frame, length, &header, &entries)) {
         return LINK_NO_FRAME;
     }
     if (header.epoch != link->peer_epoch && is_of_before(link, header.epoch) && link_is_up(link, now_ms)) {
         return LINK_OLD_SESSION;
     }
+    is_new_session = header.epoch != link->peer_epoch;
     follow_peer(link, header.sender, header.epoch);
     link_hear_signals(link, now_ms);
     if (header.peer_epoch == link->epoch) {
         drop_acknowledged(link, &header);
+        if (is_new_session && has_forgotten(link, &header)) {
+            restart(link);
+        }
     }
     /* numbers of a sender that knows this process, not the one before a restart */
     is_known = header.peer_epoch >> BOOT_SHIFT == link->boot_count && (header.peer_epoch & 0xFFu) == link->address;

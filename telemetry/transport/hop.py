@@ -198,12 +198,16 @@ class HopLink:
         if epoch != self._peer_epoch and self._is_of_before(epoch) and self.is_up(now):
             self.counters["stale_frames"] += 1
             return []
+        is_new_session = epoch != self._peer_epoch
         self._on_peer(sender, epoch)
         self._update_quality(number)
         self.last_heard = now
         self.counters["frames_received"] += 1
-        if self._outstanding and ack_epoch == self.epoch:
-            self._acknowledged(ack, ack_mask)
+        if ack_epoch == self.epoch:
+            if self._outstanding:
+                self._acknowledged(ack, ack_mask)
+            if is_new_session and ack + 1 < next(iter(self._outstanding), self._next_number):
+                self._restart()  # it met another meanwhile, and lacks what it acknowledged before
         elif not self._is_me(ack_epoch):
             entries = [(0, payload) for number, payload in entries if number == 0]
         return [payload for number, payload in entries if number == 0 or self._is_new(number, now)]

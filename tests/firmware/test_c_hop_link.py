@@ -386,3 +386,33 @@ def test_nine_payloads_are_one_too_many_and_a_slot_comes_free(library: ctypes.CD
     assert ours.state.count == 0
     assert ours.send(b"8")
     assert HEADER_BYTES + ENTRY_BYTES < ROOM
+
+
+@needs_gcc
+@pytest.mark.parametrize("meets", ["ours", "other"])
+def test_who_met_another_meanwhile_hears_everything_after_it(library: ctypes.CDLL, meets: str) -> None:
+    """Beyond the window of 64 numbers, which the one that forgot them never closed."""
+    ours, other, now = CLink(library, 2, 5), PythonLink(1, 1), 0
+    got: dict[str, list[bytes]] = {"ours": [], "other": []}
+
+    def beat(count: int) -> None:
+        nonlocal now
+        for _ in range(count):
+            now += 44
+            for frame in other.frames(now, [b"hello"]):
+                got["ours"] += ours.receive(frame, now) or []
+            for frame in ours.frames(now, [b"hello"]):
+                got["other"] += other.receive(frame, now) or []
+
+    beat(3)
+    for number in range(200):
+        assert ours.send(b"%d" % number)
+        other.link.send_reliable(b"%d" % number)
+        beat(3)
+        if number == 99:
+            for frame in PythonLink(9, 1).frames(now, [b"forged"]):
+                (ours if meets == "ours" else other).receive(frame, now)
+            beat(6)
+    for came in got.values():
+        assert [payload for payload in came if payload not in (b"hello", b"forged")] == [b"%d" % k for k in range(200)]
+    assert ours.state.count == other.link.waiting == 0

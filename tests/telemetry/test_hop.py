@@ -16,7 +16,10 @@ from telemetry.transport.hop import (
     BEST_EFFORT_LIMIT,
     BUNDLE_LIMIT,
     QUEUE_LIMIT,
+    SESSION_MASK,
+    SESSION_SHIFT,
     SILENCE,
+    WINDOW,
     Header,
     HopLink,
     pack_frame,
@@ -143,6 +146,48 @@ def test_a_session_that_was_made_up_keeps_nobody_out_for_long() -> None:
     peer.send_reliable(b"kept")
     assert passed(peer, other, 100.2) == []
     assert passed(peer, other, 100.2 + SILENCE) == [b"kept"]
+
+
+def test_who_met_another_meanwhile_gets_everything_again_and_from_one_on() -> None:
+    """Both ends, in both roles: a stranger's frame has one of them forget the numbers of the other."""
+    upper, lower, stranger = HopLink(1, 1), HopLink(2, 1), HopLink(9, 1)
+    passed(upper, lower, 100.0)
+    for place in range(2 * WINDOW):
+        upper.send_reliable(b"down %d" % place)
+        lower.send_reliable(b"up %d" % place)
+        assert passed(upper, lower, 101.0 + 0.1 * place) == [b"up %d" % place, b"down %d" % place]
+    stranger.send_best_effort(b"forged", "forged")
+    for frame in stranger.take_frames(120.0):
+        lower.receive(frame.payload, 120.0)
+    got: list[bytes] = []
+    for place in range(2 * WINDOW, 4 * WINDOW):
+        upper.send_reliable(b"down %d" % place)
+        lower.send_reliable(b"up %d" % place)
+        for beat in range(2):
+            got += passed(upper, lower, 100.0 + 0.2 * place + 0.1 * beat)
+    for kind in (b"down", b"up"):
+        came = [payload for payload in got if payload.startswith(kind)]
+        assert came == [kind + b" %d" % place for place in range(2 * WINDOW, 4 * WINDOW)]
+    assert upper.waiting == lower.waiting == 0
+    sessions = [link.epoch >> SESSION_SHIFT & SESSION_MASK for link in (upper, lower)]
+    assert sessions == [1, 2]  # once each for what was forgotten, and once more for the stranger
+
+
+@pytest.mark.parametrize("acknowledged", [0, 6, 7, 8])
+def test_a_new_session_that_has_all_it_acknowledged_leaves_our_numbers_alone(acknowledged: int) -> None:
+    """Seven were acknowledged and an eighth is on its way."""
+    sender, other = HopLink(1, 1), HopLink(2, 1)
+    passed(sender, other, 100.0)
+    for payload in payloads(7):
+        sender.send_reliable(payload)
+    assert passed(sender, other, 101.0) == payloads(7)
+    sender.send_reliable(b"eighth")
+    sender.take_frames(101.5)
+    before = sender.epoch
+    for session, place in ((1, 1), (1, 2)):
+        sender.receive(pack_frame(Header(2, 1 << 24 | session << 8 | 2, place, before, acknowledged, 0), []), 101.6)
+        assert (sender.epoch != before) is (acknowledged < 7), place
+    assert sender.waiting == (0 if acknowledged == 8 else 1)
 
 
 def test_another_tube_at_the_joint_gets_what_waits() -> None:
