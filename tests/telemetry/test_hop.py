@@ -4,6 +4,7 @@ import math
 import zlib
 
 import msgpack
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -188,6 +189,19 @@ def test_a_new_session_that_has_all_it_acknowledged_leaves_our_numbers_alone(ack
         sender.receive(pack_frame(Header(2, 1 << 24 | session << 8 | 2, place, before, acknowledged, 0), []), 101.6)
         assert (sender.epoch != before) is (acknowledged < 7), place
     assert sender.waiting == (0 if acknowledged == 8 else 1)
+
+
+def test_what_is_not_acknowledged_is_said_again_after_pauses_that_double_up_to_two_seconds() -> None:
+    sender, other = HopLink(1, 1), HopLink(2, 1)
+    passed(sender, other, 100.0)
+    sender.send_reliable(b"lost")
+    said = []
+    for now in np.arange(101.0, 107.5, 0.01).round(2).tolist():
+        other.send_best_effort(b"beat", "beat")
+        for frame in other.take_frames(now):
+            sender.receive(frame.payload, now)
+        said += [now] * sum(b"lost" in entries_of(frame.payload) for frame in sender.take_frames(now))
+    np.testing.assert_allclose(np.diff(said), [0.06, 0.12, 0.24, 0.48, 0.96, 1.92, 2.0], atol=0.0101)
 
 
 def test_another_tube_at_the_joint_gets_what_waits() -> None:
