@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 
 from telemetry.messages import Vector3
 from telemetry.parameters import ParameterBlock, unpack_block
@@ -91,7 +91,7 @@ class RecalibrationProgress:
 
     def to_json(self) -> str:
         """Text for the database."""
-        return IDLE_TEXT if self == IDLE else json.dumps(asdict(self), sort_keys=True)
+        return IDLE_TEXT if self == IDLE else json.dumps(self, default=fields_of, sort_keys=True)
 
     @classmethod
     def from_json(cls, text: str) -> RecalibrationProgress:
@@ -111,5 +111,10 @@ class RecalibrationProgress:
         return cls(RecalibrationStage(whole["stage"]), attitudes, tubes, whole["proposal"], whole.get("mixed", []))
 
 
+def fields_of(part: Attitude | Found | TubeProgress | RecalibrationProgress) -> dict[str, object]:
+    """Fields of a part by name; ``asdict`` would copy every number, at every timer."""
+    return {name: getattr(part, name) for name in part.__slots__}
+
+
 IDLE = RecalibrationProgress()
-IDLE_TEXT = json.dumps(asdict(IDLE), sort_keys=True)  # asked for at every timer of a rig that calibrates nothing
+IDLE_TEXT = json.dumps(IDLE, default=fields_of, sort_keys=True)  # asked for at every timer, mostly
