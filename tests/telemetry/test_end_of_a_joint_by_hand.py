@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import socket
 from pathlib import Path
@@ -12,7 +13,7 @@ import pytest
 
 from telemetry.application import arguments
 from telemetry.application.commands import COMMANDS
-from telemetry.errors import CommandError
+from telemetry.errors import CommandError, EncodeError, RadioError
 from telemetry.media import can_exchange, chip_bridge
 from telemetry.media.can_exchange import (
     ACKNOWLEDGE_LIMIT,
@@ -32,9 +33,11 @@ from telemetry.media.can_timing import BitRates
 from telemetry.media.chip_bridge import ChipBridge
 from telemetry.media.port import PortFrame, Priority
 from telemetry.media.send_queue import SendQueue
-from telemetry.messages import NodeFlag
+from telemetry.messages import DepthReading, NodeFlag, Stand
 from telemetry.presentation.can_native import Split
+from telemetry.presentation.msgpack_codec import decode_message, encode_message
 from telemetry.quantities import ValueKind
+from telemetry.radio.waveguide import HIGHEST, WaveguideMode
 from telemetry.runtime.disk import MachineDisk
 from telemetry.runtime.step_stream import StepStream
 
@@ -331,3 +334,21 @@ def test_whole_numbers_of_orders_are_checked_by_their_quantity() -> None:
         assert arguments._check(argument, low) == low
         with pytest.raises(CommandError, match=argument.quantity.name):
             arguments._check(argument, low - 1)
+
+
+def test_a_stand_of_the_bit_has_a_depth_of_the_bit() -> None:
+    for md, is_depth in ((0.0, True), (50.0, True), (-1e-3, False), (math.inf, False)):
+        reading = DepthReading(7, 10.0, 50.0, stands=(Stand(3, 1.0, 2.0, md),))
+        if is_depth:
+            assert decode_message(encode_message(reading)) == reading
+        else:
+            with pytest.raises(EncodeError, match="stands"):
+                encode_message(reading)
+
+
+def test_modes_of_a_guide_have_their_largest_numbers_and_none_beyond() -> None:
+    for m, n, is_mode in (
+        (HIGHEST, HIGHEST, True), (0, 1, True), (HIGHEST + 1, 1, False), (0, HIGHEST + 1, False), (0, 0, False),
+    ):  # fmt: skip
+        with contextlib.nullcontext() if is_mode else pytest.raises(RadioError, match="expected m of"):
+            WaveguideMode("TE", m, n)

@@ -170,3 +170,11 @@ def test_a_triad_passes_up_to_its_bounds_and_force_lands_what_does_not() -> None
     assert pass_gates([size, Gate("fine", holds=True)], force=True) == (f"size: {size.found}",)
     with pytest.raises(CalibrationError, match=r"refused by size: .*; angle: .* \(--force lands it"):
         pass_gates([size, angle], force=False)
+
+
+def test_faces_over_two_rounds_and_one_more_turn_with_the_jig_or_against_it() -> None:
+    """Nine faces a quarter of a turn apart: all nine agree one way, and of the other eight of nine cancel."""
+    jig, tilt = np.arange(9) * math.pi / 2.0, np.full(9, 1.0)
+    assert face_gate(jig + 0.3, jig, tilt).holds
+    against = face_gate(-jig, jig, tilt)
+    assert (against.holds, against.found.startswith("turns against the jig's")) == (False, True)
