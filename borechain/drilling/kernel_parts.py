@@ -1,18 +1,25 @@
-"""Parts of what a rig compiles, each by a process of its own: ``python -m borechain.drilling.kernel_parts PART``.
+"""Parts of what a rig compiles, beside each other: ``python -m borechain.drilling.kernel_parts PART...``.
 
 A line goes to its output for every function that was compiled. What is there already is loaded, so that a part takes a
 second where nothing is lacking. Only what a rig calls is kept: a kernel inside another one is compiled anew by who
 calls it alone.
+
+Numba, and what it loads with its first function, is loaded once; each part is then compiled by a process forked off,
+and in a new environment the bytecode of all that is written once, and not by every one of them.
 """
 
 from __future__ import annotations
 
+import gc
+import multiprocessing
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
+from numba import njit
 
+from borechain.drilling.compile_ahead import mark_of
 from borechain.drilling.whole_compilation import compiled_whole
 from node.kernels.arithmetic.compiler import leave_blas_out, telling_compiled
 
@@ -74,6 +81,36 @@ PARTS: Final[Mapping[str, Callable[[], None]]] = {
 }
 
 
+def compile_beside(parts: Sequence[str]) -> None:
+    """Compile parts beside each other, and mark those that succeeded."""
+    load_compiler()
+    fork = multiprocessing.get_context("fork")
+    running = [fork.Process(target=compile_part, args=(part,)) for part in parts]
+    for process in running:
+        process.start()
+    for part, process in zip(parts, running, strict=True):
+        process.join()
+        if process.exitcode == 0:
+            mark_of(part).touch()
+
+
+def load_compiler() -> None:
+    """Have numba load what it needs for any function, by compiling one."""
+    leave_blas_out()
+    njit()(_get_same)(0.0)
+    gc.freeze()  # no process writes into the pages that they share, only to look for garbage
+
+
+def _get_same(number: float) -> float:
+    return number
+
+
+def compile_part(part: str) -> None:
+    """Compile one part, with a line for each function."""
+    with compiled_whole(), telling_compiled(began=lambda: None, ended=say_one):
+        PARTS[part]()
+
+
 def say_one() -> None:
     """Write the line of a function that was compiled."""
     sys.stdout.write(".\n")
@@ -81,6 +118,4 @@ def say_one() -> None:
 
 
 if __name__ == "__main__":
-    leave_blas_out()
-    with compiled_whole(), telling_compiled(began=lambda: None, ended=say_one):
-        PARTS[sys.argv[1]]()
+    compile_beside(sys.argv[1:])
