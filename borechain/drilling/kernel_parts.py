@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
+from llvmlite import binding
 from numba import njit
 
 from borechain.drilling.compile_ahead import mark_of
@@ -58,10 +59,20 @@ def warm_surveys() -> None:
 
 
 def compile_adjustment() -> None:
-    """The adjustment of the hole: as much as the other two, so that two cores end together."""
+    """The adjustment of the hole."""
     from groundstation.survey.adjustment.warm_adjustment import warm_adjustment
 
+    keep_loops()
     warm_adjustment()
+
+
+def keep_loops() -> None:
+    """Have LLVM write out no loop from now on, in all of this process.
+
+    An adjustment multiplies blocks (4, 4) at some thirty places, and each was written out: a third of its compilation,
+    for code that was no faster. The order of the sums is the same, and so is every bit.
+    """
+    binding.set_option("borechain", "-unroll-threshold=0")
 
 
 def compile_integers() -> None:

@@ -43,6 +43,27 @@ def fail():
 kernel_parts.PARTS = {"one": look, "other": look, "failing": fail}
 kernel_parts.compile_beside(list(kernel_parts.PARTS))
 """
+LOOPS = r"""
+import re
+import sys
+import numpy as np
+from borechain.drilling.kernel_parts import keep_loops
+from numba import njit
+
+def add_product(one, other, out):
+    for a in range(4):
+        for i in range(4):
+            for b in range(4):
+                out[a, b] += one[a, i] * other[i, b]
+
+if sys.argv[1] == "kept":
+    keep_loops()
+made = njit("void(f8[:, ::1], f8[:, ::1], f8[:, ::1])")(add_product)
+one, other, out = np.random.default_rng(1).normal(size=(3, 4, 4))
+made(one, other, out)
+code = next(iter(made.inspect_asm().values()))
+print(len(re.findall(r"\tv?f?mul[sp]?d?\t", code)), out.tobytes().hex())
+"""
 LACKING = "node.kernels.string.encoder_step"  # a second to compile
 
 
@@ -92,6 +113,12 @@ def test_a_part_finds_the_compiler_loaded_and_is_marked_by_its_end(tmp_path: Pat
     said = [line for line in done.stdout.splitlines() if line != "."]
     assert [line.strip() for line in said] == ["|", "|"], done.stderr
     assert sorted(path.name.partition("-")[0] for path in tmp_path.iterdir()) == ["one", "other"]
+
+
+def test_loops_that_are_kept_are_less_code_for_the_same_numbers(tmp_path: Path) -> None:
+    (short, kept), (long, usual) = (run(tmp_path, "-c", LOOPS, how).stdout.split() for how in ("kept", "usual"))
+    assert kept == usual
+    assert 3 * int(short) <= 2 * int(long)
 
 
 def test_a_rig_says_that_it_compiles(cache: Path, tmp_path: Path) -> None:
