@@ -35,7 +35,7 @@ class Kernels:
     def done_of(self) -> tuple[int, int]:
         """How many functions are compiled, of how many; (0, 0) while that is not known."""
         words = lines_of(self._said)
-        return (int(words[-1]), int(words[0])) if words else (0, 0)
+        return (len(words) - 1, int(words[0])) if words else (0, 0)
 
     def has_ended(self) -> bool:
         """Whether there is nothing more to wait for."""

@@ -1,4 +1,4 @@
-"""Kernels compiled before a rig begins, in several processes: a newcomer sees how far they are.
+"""Kernels compiled before a rig begins, on every core: a newcomer sees how far they are.
 
 Without it the fork server compiles them, one after the other and without a word. A file in their folder says that all
 of a rig's are there, by the digest of the sources that they are made of.
@@ -7,7 +7,6 @@ of a rig's are there, by the digest of the sources that they are made of.
 from __future__ import annotations
 
 import hashlib
-import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -35,7 +34,7 @@ ShowCompiling = Callable[[int], AbstractContextManager[Callable[[int], None]]]  
 
 def are_compiled(kernel: str) -> bool:
     """Whether all that a rig of this kernel needs was compiled, or delivered."""
-    return all(mark_of(part).exists() for part in PARTS_OF[kernel])
+    return not lacking_parts(kernel)
 
 
 def mark_of(part: str) -> Path:
@@ -44,31 +43,34 @@ def mark_of(part: str) -> Path:
     return folder_in_use() / f"{part}-{hashlib.sha256(sources.encode()).hexdigest()[:16]}"
 
 
+def lacking_parts(kernel: str) -> list[str]:
+    """The parts of a rig's kernels that are not there."""
+    return [part for part in PARTS_OF[kernel] if not mark_of(part).exists()]
+
+
+def count_about(parts: Sequence[str]) -> int:
+    """How many functions these parts compile, about."""
+    return sum(ABOUT[part] for part in parts)
+
+
 def compile_ahead(kernel: str, show: ShowCompiling) -> None:
     """Compile what is lacking of a rig's kernels, its parts beside each other; without a word where nothing is.
 
     A part that fails is left to the rig, which then says why.
     """
-    lacking = [part for part in PARTS_OF[kernel] if not mark_of(part).exists()]
-    if not lacking:
-        return
-    with show(sum(ABOUT[part] for part in lacking)) as tell:
-        for part in compile_parts(lacking, tell):
-            mark_of(part).touch()
+    lacking = lacking_parts(kernel)
+    if lacking:
+        with show(count_about(lacking)) as tell:
+            compile_parts(lacking, tell)
 
 
-def compile_parts(parts: Sequence[str], tell: Callable[[int], None]) -> list[str]:
-    """Compile parts, each in a process of its own, telling how many functions are done; those that succeeded."""
-    reading, writing = os.pipe()
-    command = [sys.executable, "-m", "borechain.drilling.kernel_parts"]
-    running = {part: subprocess.Popen([*command, part], stdout=writing) for part in parts}
-    os.close(writing)
-    try:
-        with os.fdopen(reading) as lines:
-            for done, _ in enumerate(lines, 1):
+def compile_parts(parts: Sequence[str], tell: Callable[[int], None]) -> None:
+    """Compile parts in a process of their own, telling how many functions are done."""
+    command = [sys.executable, "-m", "borechain.drilling.kernel_parts", *parts]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as running:
+        try:
+            for done, _ in enumerate(running.stdout or (), 1):
                 tell(done)
-        return [part for part, process in running.items() if process.wait() == 0]
-    finally:
-        for process in running.values():
-            process.kill()
-            process.wait()
+        except BaseException:
+            running.kill()  # what it has forked ends as it writes its next line
+            raise

@@ -1,18 +1,26 @@
-"""Parts of what a rig compiles, each by a process of its own: ``python -m borechain.drilling.kernel_parts PART``.
+"""Parts of what a rig compiles, beside each other: ``python -m borechain.drilling.kernel_parts PART...``.
 
 A line goes to its output for every function that was compiled. What is there already is loaded, so that a part takes a
 second where nothing is lacking. Only what a rig calls is kept: a kernel inside another one is compiled anew by who
 calls it alone.
+
+Numba, and what it loads with its first function, is loaded once; each part is then compiled by a process forked off,
+and in a new environment the bytecode of all that is written once, and not by every one of them.
 """
 
 from __future__ import annotations
 
+import gc
+import multiprocessing
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
+from llvmlite import binding
+from numba import njit
 
+from borechain.drilling.compile_ahead import mark_of
 from borechain.drilling.whole_compilation import compiled_whole
 from node.kernels.arithmetic.compiler import leave_blas_out, telling_compiled
 
@@ -51,10 +59,20 @@ def warm_surveys() -> None:
 
 
 def compile_adjustment() -> None:
-    """The adjustment of the hole: as much as the other two, so that two cores end together."""
+    """The adjustment of the hole."""
     from groundstation.survey.adjustment.warm_adjustment import warm_adjustment
 
+    keep_loops()
     warm_adjustment()
+
+
+def keep_loops() -> None:
+    """Have LLVM write out no loop from now on, in all of this process.
+
+    An adjustment multiplies blocks (4, 4) at some thirty places, and each was written out: a third of its compilation,
+    for code that was no faster. The order of the sums is the same, and so is every bit.
+    """
+    binding.set_option("borechain", "-unroll-threshold=0")
 
 
 def compile_integers() -> None:
@@ -74,6 +92,36 @@ PARTS: Final[Mapping[str, Callable[[], None]]] = {
 }
 
 
+def compile_beside(parts: Sequence[str]) -> None:
+    """Compile parts beside each other, and mark those that succeeded."""
+    load_compiler()
+    fork = multiprocessing.get_context("fork")
+    running = [fork.Process(target=compile_part, args=(part,)) for part in parts]
+    for process in running:
+        process.start()
+    for part, process in zip(parts, running, strict=True):
+        process.join()
+        if process.exitcode == 0:
+            mark_of(part).touch()
+
+
+def load_compiler() -> None:
+    """Have numba load what it needs for any function, by compiling one."""
+    leave_blas_out()
+    njit()(_get_same)(0.0)
+    gc.freeze()  # no process writes into the pages that they share, only to look for garbage
+
+
+def _get_same(number: float) -> float:
+    return number
+
+
+def compile_part(part: str) -> None:
+    """Compile one part, with a line for each function."""
+    with compiled_whole(), telling_compiled(began=lambda: None, ended=say_one):
+        PARTS[part]()
+
+
 def say_one() -> None:
     """Write the line of a function that was compiled."""
     sys.stdout.write(".\n")
@@ -81,6 +129,4 @@ def say_one() -> None:
 
 
 if __name__ == "__main__":
-    leave_blas_out()
-    with compiled_whole(), telling_compiled(began=lambda: None, ended=say_one):
-        PARTS[sys.argv[1]]()
+    compile_beside(sys.argv[1:])

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from borechain.cli.notices import print_notice
 
-HOW_LONG = "once for this version, about a quarter of a minute on two cores; in integers some minutes"
+HOW_LONG = "once for this version, some twenty seconds on two cores; in integers some minutes"
 
 
 def compile_for_rig(scenario: Path, chips: str = "") -> None:
