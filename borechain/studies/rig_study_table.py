@@ -49,6 +49,31 @@ BLUNDERS: Columns = (
     ("causes", "named"),
     ("seen_by", "seen by alone"),
 )
+NODE_DAYS: Columns = (
+    ("case", "day of one node"),
+    ("seeds", "seeds"),
+    ("much_untold_percent", "more than 2 % of the time untold, % of seeds"),
+    ("much_untold_low", "from"),
+    ("much_untold_high", "to"),
+    ("untold_percent", "time untold, %"),
+    ("surveys", "surveys"),
+    ("yaw_beyond_percent", "yaw beyond 3 sigma untold, %"),
+    ("yaw_beyond_low", "from"),
+    ("yaw_beyond_high", "to"),
+    ("azimuth_beyond_percent", "azimuth likewise, %"),
+    ("azimuth_beyond_low", "from"),
+    ("azimuth_beyond_high", "to"),
+)
+RIG_DAYS: Columns = (
+    ("case", "day of a rig"),
+    ("rigs", "rigs"),
+    ("stations", "stations"),
+    ("beyond_percent", "directions beyond 3 sigma, %"),
+    ("untold_percent", "beyond and untold, %"),
+    ("untold_low", "from"),
+    ("untold_high", "to"),
+    ("told_percent", "rigs that are told of something, %"),
+)
 FIRST: Final = Option("first", 1, 0, 2**31 - 1, help="Number from which the rigs are drawn.")
 RIG_STUDIES: Final = by_name(
     "studies",
@@ -84,6 +109,29 @@ RIG_STUDIES: Final = by_name(
             drawn=False,
             full=("--seeds 9 --honest 1000",),
             short="--seeds 1 --honest 1",
+        ),
+        Study(
+            "bad-days",
+            "What days of five to eight mild disturbances leave untold: of one node, and after a rig's adjustment.",
+            f"{MODULES}.bad_days",
+            (
+                ResultTable("Bad days of one node, {seeds} seeds", NODE_DAYS, NODE_DAYS),
+                ResultTable(
+                    "Bad days of a rig after its adjustment, {rigs} rigs a row",
+                    RIG_DAYS,
+                    RIG_DAYS,
+                    rows="rig_cases",
+                    suffix="-rigs",
+                ),
+            ),
+            (
+                Option("seeds", 1000, 1, 100_000, help="Of one node."),
+                Option("rigs", 100, 1, 10_000, help="Of each row of the second table."),
+                FIRST,
+            ),
+            drawn=False,
+            full=("--seeds 40 --rigs 4",),
+            short="--seeds 2 --rigs 1",
         ),
     ],
 )

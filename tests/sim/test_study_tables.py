@@ -24,14 +24,14 @@ from sim.studies.pool import CORES, one_pool, over_cores, seed_jobs, usable_core
 from sim.studies.study import Option, ResultTable, Study
 from sim.studies.study_table import STUDIES
 
-UNKEPT = ("blunders", "set-up")  # whole rigs for minutes, whose parts are in tests/studies
+UNKEPT = ("bad-days", "blunders", "set-up")  # whole rigs for minutes, whose parts are in tests/studies
 FIGURES_KEPT = json.loads(FIGURES.read_text("utf-8"))
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 KEPT = [*STUDIES.values(), *RIG_STUDIES.values()]  # whose tables stand there
 # the longest with two seeds; the modes share the code of two-nodes, the others have tests of their own
 LONG = {
     *("ingredients", "update-modes", "single-updates", "fifty-nodes", "delay", "consistency", "outage", "bent-holes"),
-    *("worlds", "blunders"),
+    *("worlds", "blunders", "bad-days"),
 }
 STUDY = """
     from groundstation.report.style import new_figure
