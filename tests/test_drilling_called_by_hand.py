@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import io
 import json
 import math
 from dataclasses import replace
@@ -220,17 +219,14 @@ def test_processes_are_followed_asked_at_the_end_and_counted(monkeypatch: pytest
 # compiling
 
 
-def test_what_is_lacking_alone_is_compiled_and_marked_where_it_succeeded(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_what_is_lacking_alone_is_compiled(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     marks = {part: tmp_path / part for part in ("step", "surveys", "adjustment", "integers")}
     monkeypatch.setattr(compile_ahead, "mark_of", lambda part: marks[part])
     compiled: Given = []
 
-    def compile_parts(parts: Any, tell: Any) -> list[str]:
+    def compile_parts(parts: Any, tell: Any) -> None:
         compiled.append(list(parts))
         tell(12)
-        return [part for part in parts if part != "surveys"]
 
     monkeypatch.setattr(compile_ahead, "compile_parts", compile_parts)
     shown: Given = []
@@ -243,36 +239,69 @@ def test_what_is_lacking_alone_is_compiled_and_marked_where_it_succeeded(
     marks["adjustment"].touch()
     compile_ahead.compile_ahead("float64", show)
     assert (compiled, shown) == ([["step", "surveys"]], [305 + 270, 12])
+    marks["step"].touch()
     assert not compile_ahead.are_compiled("float64")
     compile_ahead.compile_ahead("fixed", show)
     assert (compiled[1], shown[2:]) == (["surveys", "integers"], [270 + 500, 12])
-    marks["surveys"].touch()
+    for part in ("surveys", "integers"):
+        marks[part].touch()
     compile_ahead.compile_ahead("fixed", show)
     assert len(compiled) == 2
     assert compile_ahead.are_compiled("float64")
     assert compile_ahead.are_compiled("chip")
 
 
-def test_parts_are_compiled_beside_each_other_and_each_line_is_one_function(monkeypatch: pytest.MonkeyPatch) -> None:
-    ended: Given = []
+def test_parts_are_compiled_by_one_process_and_each_line_is_one_function(monkeypatch: pytest.MonkeyPatch) -> None:
+    done: Given = []
 
-    class Part:
+    class Running:
         def __init__(self, command: list[str], stdout: int) -> None:
-            assert command[1:3] == ["-m", "borechain.drilling.kernel_parts"]
-            self.part = command[3]
-            with io.open(stdout, "wb", closefd=False) as file:  # noqa: UP020
-                file.write(b".\n" * (2 if self.part == "step" else 1))
+            assert command[1:] == ["-m", "borechain.drilling.kernel_parts", "step", "integers"]
+            self.stdout = [b".\n"] * 3
 
-        def wait(self) -> int:
-            return int(self.part == "integers")
+        def __enter__(self) -> Running:
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            done.append("waited for")
 
         def kill(self) -> None:
-            ended.append(self.part)
+            done.append("killed")
 
-    monkeypatch.setattr(compile_ahead.subprocess, "Popen", Part)
+    monkeypatch.setattr(compile_ahead.subprocess, "Popen", Running)
     counts: Given = []
-    assert compile_ahead.compile_parts(["step", "integers"], counts.append) == ["step"]
-    assert (counts, ended) == ([1, 2, 3], ["step", "integers"])
+    compile_ahead.compile_parts(["step", "integers"], counts.append)
+    assert (counts, done) == ([1, 2, 3], ["waited for"])
+
+    def interrupt(count: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        compile_ahead.compile_parts(["step", "integers"], interrupt)
+    assert done[1:] == ["killed", "waited for"]
+
+
+def test_a_part_that_failed_is_not_marked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(kernel_parts, "mark_of", lambda part: tmp_path / part)
+    monkeypatch.setattr(kernel_parts, "load_compiler", lambda: None)
+    begun: Given = []
+
+    class Process:
+        def __init__(self, target: Any, args: tuple[str]) -> None:
+            assert target is kernel_parts.compile_part
+            self.part = args[0]
+            self.exitcode = {"step": 0, "surveys": 1}.get(self.part, -9)
+
+        def start(self) -> None:
+            begun.append(f"{self.part} starts")
+
+        def join(self) -> None:
+            begun.append(f"{self.part} ends")
+
+    monkeypatch.setattr(kernel_parts.multiprocessing, "get_context", lambda way: SimpleNamespace(Process=Process))
+    kernel_parts.compile_beside(["surveys", "step", "integers"])
+    assert [one.name for one in tmp_path.iterdir()] == ["step"]
+    assert begun == [f"{part} {what}" for what in ("starts", "ends") for part in ("surveys", "step", "integers")]
 
 
 def test_a_part_is_compiled_by_its_name_and_a_line_is_said_for_each(monkeypatch: pytest.MonkeyPatch) -> None:
