@@ -18,11 +18,13 @@ def wilson_interval(share: float, trials: float) -> tuple[float, float]:
 
     >>> tuple(round(end, 4) for end in wilson_interval(0.1, 10))
     (0.0179, 0.4042)
+    >>> wilson_interval(0.0, 80)[0], wilson_interval(1.0, 80)[1]  # the ends themselves, not what rounding leaves of them
+    (0.0, 1.0)
     """
     squares = SIGMAS**2 / trials
     middle = (share + 0.5 * squares) / (1.0 + squares)
     half = SIGMAS * math.sqrt(share * (1.0 - share) / trials + 0.25 * squares / trials) / (1.0 + squares)
-    return max(middle - half, 0.0), min(middle + half, 1.0)
+    return middle - half if share > 0.0 else 0.0, middle + half if share < 1.0 else 1.0
 
 
 def interval_of(key: str, share: float, trials: float) -> dict[str, float]:
