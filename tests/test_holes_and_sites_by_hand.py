@@ -6,13 +6,14 @@ import contextlib
 import gc
 import json
 import re
+import runpy
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from borechain.drilling import compile_early, drill_hole, drill_site, rig_host, router_host
+from borechain.drilling import compile_ahead, compile_early, drill_hole, drill_site, kernel_parts, rig_host, router_host
 from borechain.drilling.rare_collection import rare_collection
 from borechain.drilling.rig_job import DrilledRig, RigJob, RigRun, RigWatcher
 from groundstation.gateway.page.page_settings import PageSettings
@@ -150,11 +151,16 @@ def test_garbage_is_looked_for_rarely_and_as_before_afterwards() -> None:
     assert gc.get_threshold() == before
 
 
-def test_numbers_of_an_early_compilation_are_a_line_each(capsys: pytest.CaptureFixture[str]) -> None:
-    with compile_early.numbers_told(635) as tell:
-        tell(1)
-        tell(300)
-    assert capsys.readouterr().out == "635\n1\n300\n"
+@pytest.mark.parametrize(("lacking", "said"), [(["step", "adjustment"], "365\n"), ([], "")])
+def test_an_early_compilation_says_of_how_many_and_compiles_what_is_lacking(
+    lacking: list[str], said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    compiled: list[object] = []
+    monkeypatch.setattr(compile_ahead, "lacking_parts", {"float64": lacking}.__getitem__)
+    monkeypatch.setattr(kernel_parts, "compile_beside", compiled.append)
+    runpy.run_path(compile_early.__file__, run_name="__main__")
+    assert capsys.readouterr().out == said
+    assert compiled == [lacking] * bool(lacking)
 
 
 @pytest.mark.parametrize(("waited", "said"), [(0.0, False), (9.5, False), (10.0, True), (10.5, False), (20.0, True)])

@@ -208,7 +208,7 @@ def test_a_disk_that_is_full_is_named_and_keeps_what_was_there(monkeypatch: pyte
         raise OSError(errno.ENOSPC, "No space left on device", "draft")
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(EnvironmentFault, match="draft: No space left on device; nothing was written"):
+    with pytest.raises(EnvironmentFault, match=r"/one\.json: No space left on device; nothing was written"):
         calibration_output.write_files_whole({tmp_path / "one.json": b"new"})
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("one.json", b"old")]
 

@@ -76,7 +76,7 @@ class FigureDrawnOnce(Figure):
     def draw(self, renderer: RendererBase) -> None:
         """Draw it, or only lay it out where it is drawn for the sake of that."""
         engine = self.get_layout_engine()
-        if isinstance(engine, ConstrainedLayoutEngine) and self.canvas.is_saving():
+        if self.axes and isinstance(engine, ConstrainedLayoutEngine) and self.canvas.is_saving():
             engine.execute(self)
         else:
             super().draw(renderer)

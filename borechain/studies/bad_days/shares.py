@@ -18,7 +18,7 @@ def wilson_interval(share: float, trials: float) -> tuple[float, float]:
 
     >>> tuple(round(end, 4) for end in wilson_interval(0.1, 10))
     (0.0179, 0.4042)
-    >>> wilson_interval(0.0, 80)[0], wilson_interval(1.0, 80)[1]  # the ends themselves, not what rounding leaves of them
+    >>> wilson_interval(0.0, 80)[0], wilson_interval(1.0, 80)[1]
     (0.0, 1.0)
     """
     squares = SIGMAS**2 / trials

@@ -67,8 +67,13 @@ class ExaminedHole:
 
     @property
     def drawn(self) -> Adjusted:
-        """The hole as it is drawn, with the ± of its positions."""
+        """The hole as it is drawn, with the ± of its positions; without its looks."""
         return self.examination.drawn
+
+    @cached_property
+    def _drawn_with_looks(self) -> Adjusted:
+        """The same for answers that are made of looks; kept from the first that is asked on."""
+        return self.examination.drawn_with_looks
 
     def sentence(self, blunder: Blunder) -> str:
         """What is wrong, in a driller's words."""
@@ -102,7 +107,8 @@ class ExaminedHole:
     @cached_property
     def shares(self) -> list[ErrorShare]:
         """Of what the variance at the toe is made."""
-        return [*toe_budget(self.drawn, self.run.causes), *self._suspected(toe_weights(self.drawn))]
+        drawn = self._drawn_with_looks
+        return [*toe_budget(drawn, self.run.causes), *self._suspected(toe_weights(drawn))]
 
     def _suspected(self, weights: Array) -> list[ErrorShare]:
         """Share of a suspicion in the variance of functionals (s + 1, 2, r) of the directions."""
@@ -123,7 +129,7 @@ class ExaminedHole:
     def position_variances(self) -> dict[str, Array]:
         """Variances (s + 1, 3), m^2, of collar and stations to north, east and down by what looks have in common."""
         found: dict[str, Array] = {}
-        for share in position_shares(self.drawn, self.run.causes):
+        for share in position_shares(self._drawn_with_looks, self.run.causes):
             name = SOURCE_NAMES.get(share.source)
             if share.source is ShareSource.TURN:
                 name = KINDS.get(self.share_name(share)[0], "joints")

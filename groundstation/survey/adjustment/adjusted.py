@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -69,6 +69,12 @@ class Adjusted:
         counts = np.bincount(tube, minlength=count)
         sums = np.stack([np.bincount(tube, one, minlength=count) for one in self.looks.force.T], axis=1)
         return sums / np.maximum(counts, 1)[:, None], counts
+
+    def without_looks(self) -> Adjusted:
+        """Directions and their covariance alone: what is kept of looks (n,) where no look is asked about any more."""
+        of_looks = ("jacobians", "weights", "residuals", "squares", "tilts")
+        none = {name: getattr(self.linear, name)[:0].copy() for name in of_looks}
+        return replace(self, linear=replace(self.linear, **none))
 
     @property
     def bases(self) -> Array:

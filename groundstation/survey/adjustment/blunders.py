@@ -106,7 +106,13 @@ class Examination:
 
     @cached_property
     def drawn(self) -> Adjusted:
-        """The hole as it is drawn: as ``adjusted``, by how sharply it seems to bend among all holes.
+        """The hole as it is drawn, without its looks; see ``drawn_with_looks``."""
+        found = self.drawn_with_looks
+        return found if found is self.adjusted else found.without_looks()
+
+    @property
+    def drawn_with_looks(self) -> Adjusted:
+        """The hole as ``adjusted``, by how sharply it seems to bend among all holes; worked out each time.
 
         What is wrong is looked for in a hole that may bend as is usual, so that a blunder is not taken for a bend of a
         calm one; the ± of its positions is that of this hole. Where that one has no solution it is as ``adjusted``.
