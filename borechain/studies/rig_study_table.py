@@ -107,7 +107,7 @@ RIG_STUDIES: Final = by_name(
             ),
             counts="rigs",
             drawn=False,
-            full=("--seeds 9 --honest 1000",),
+            full=("--seeds 29 --honest 2000",),
             short="--seeds 1 --honest 1",
         ),
         Study(
