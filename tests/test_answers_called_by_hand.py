@@ -300,6 +300,11 @@ def test_a_password_is_set_of_a_person_alone_and_taken_from_him_alone(
         assert (done.exit_code, f"got {name!r}" in done.output) == (2, True)
     done = run_command(pki_room.pki, "password", "operator", "--remove", "--file", str(file))
     assert (done.exit_code, done.output) == (2, f"Error: {file}: expected one of driller, driller/anna, got operator\n")
+    of_anna = run_command(pki_room.pki, "password", "driller", "--name", "anna", "--remove", "--file", str(file))
+    assert of_anna.output.startswith(f"{file}: driller/anna has no password any more; ")
+    assert read_passwords(file) == {"driller": known["driller"]}
+    run_command(pki_room.pki, "password", "driller", "--name", "anna", "--file", str(file))
+    known = read_passwords(file)
     done = run_command(pki_room.pki, "password", "driller", "--remove", "--file", str(file))
     assert done.output == f"{file}: driller has no password any more; its sessions end within seconds\n"
     assert read_passwords(file) == {"driller/anna": known["driller/anna"]}

@@ -27,43 +27,6 @@ def show(count):
 compile_ahead(sys.argv[1], show)
 print(are_compiled(sys.argv[1]), len(told), max(told, default=0))
 """
-LOOKING = """
-import sys
-from borechain.drilling import kernel_parts
-from numba import njit
-
-def look():
-    before = set(sys.modules)
-    njit(lambda number: [number])(1.0)
-    print(*(set(sys.modules) - before), "|", flush=True)
-
-def fail():
-    raise SystemExit(3)
-
-kernel_parts.PARTS = {"one": look, "other": look, "failing": fail}
-kernel_parts.compile_beside(list(kernel_parts.PARTS))
-"""
-LOOPS = r"""
-import re
-import sys
-import numpy as np
-from borechain.drilling.kernel_parts import keep_loops
-from numba import njit
-
-def add_product(one, other, out):
-    for a in range(4):
-        for i in range(4):
-            for b in range(4):
-                out[a, b] += one[a, i] * other[i, b]
-
-if sys.argv[1] == "kept":
-    keep_loops()
-made = njit("void(f8[:, ::1], f8[:, ::1], f8[:, ::1])")(add_product)
-one, other, out = np.random.default_rng(1).normal(size=(3, 4, 4))
-made(one, other, out)
-code = next(iter(made.inspect_asm().values()))
-print(len(re.findall(r"\tv?f?mul[sp]?d?\t", code)), out.tobytes().hex())
-"""
 LACKING = "node.kernels.string.encoder_step"  # a second to compile
 
 
@@ -105,20 +68,6 @@ def test_a_part_that_fails_is_not_taken_for_compiled(cache: Path) -> None:
     done = run(cache, "-c", PROGRAM, "float64")
     assert done.stdout.split()[0] == "False", done.stderr
     assert not list(cache.glob("surveys-*"))
-
-
-def test_a_part_finds_the_compiler_loaded_and_is_marked_by_its_end(tmp_path: Path) -> None:
-    """Loading it takes a second, and in a new environment its bytecode is written: once, not by every part."""
-    done = run(tmp_path, "-c", LOOKING)
-    said = [line for line in done.stdout.splitlines() if line != "."]
-    assert [line.strip() for line in said] == ["|", "|"], done.stderr
-    assert sorted(path.name.partition("-")[0] for path in tmp_path.iterdir()) == ["one", "other"]
-
-
-def test_loops_that_are_kept_are_less_code_for_the_same_numbers(tmp_path: Path) -> None:
-    (short, kept), (long, usual) = (run(tmp_path, "-c", LOOPS, how).stdout.split() for how in ("kept", "usual"))
-    assert kept == usual
-    assert 3 * int(short) <= 2 * int(long)
 
 
 def test_a_rig_says_that_it_compiles(cache: Path, tmp_path: Path) -> None:
