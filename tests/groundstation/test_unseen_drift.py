@@ -12,6 +12,8 @@ from groundstation.service.alarms.verdict_doubts import known_of
 from groundstation.service.answers.model import RigModel
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.least_found import DRIFT, LARGEST
+from groundstation.survey.adjustment.reliability import measure_reliability
+from groundstation.survey.adjustment.toe_weights import toe_weights
 from groundstation.survey.adjustment.unseen_drift import UnseenDrift, places_moved
 
 STOPS = 8
@@ -77,8 +79,13 @@ def test_it_is_the_drift_of_the_reliabilities_and_counts_in_the_verdict(tmp_path
     told, examined = unseen(model), model.hole.examined
     assert examined is not None
     (one,) = [one for one in examined.reliabilities if one.hypothesis == DRIFT]
-    assert told.a_stop == pytest.approx(one.smallest, rel=1e-6)
-    np.testing.assert_allclose(np.abs(told.positions[-1, :2]), one.unfound[:2], rtol=1e-6, atol=1e-9)
+    assert told.a_stop == one.smallest
+    (by_scores,) = measure_reliability(
+        examined.adjusted, examined.run, [DRIFT], toe_weights(examined.adjusted), LARGEST, examined.chance
+    )
+    assert one.smallest == pytest.approx(by_scores.smallest, rel=1e-9)
+    np.testing.assert_allclose(one.at_toe, by_scores.at_toe, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(one.by_size, by_scores.by_size, rtol=1e-9, atol=1e-15)
     known = known_of(model.config, model.string, model.setup, model.hole, model.rig_alarms)
     assert known.drift == told.toe == math.hypot(*told.positions[-1, :2])
 

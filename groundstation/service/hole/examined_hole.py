@@ -166,14 +166,15 @@ class ExaminedHole:
     @cached_property
     def unseen_drift(self) -> UnseenDrift | None:
         """What an encoder that slips a little at every stop may do unfound; None while too few stops tell it."""
-        return None if self.is_drift_known else drift_unseen(self.adjusted, self.run, self.chance)
+        return None if self.is_drift_known else drift_unseen(self.adjusted, self.chance)
 
     @cached_property
     def reliabilities(self) -> list[Reliability]:
         """How well what may go wrong with each tube at its newest stop, and with the string, would be found."""
         found, run = self.adjusted, self.run
-        possible = [one for one in possible_mistakes(found.looks, run) if not (one == DRIFT and self.is_drift_known)]
-        return measure_reliability(found, run, possible, toe_weights(found), LARGEST, self.chance)
+        possible = possible_mistakes(found.looks, run)
+        told = measure_reliability(found, run, possible, toe_weights(found), LARGEST, self.chance)
+        return told if self.unseen_drift is None else [*told, self.unseen_drift.reliability]
 
 
 def std_across(variances: Array) -> float:

@@ -1,6 +1,6 @@
 """The smallest mistake of each kind that would be found at the last stop, where it would do most at the toe.
 
-And the smallest drift of the encoder: it is of all stops.
+A drift of the encoder is of all stops: see ``unseen_drift``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from groundstation.survey.adjustment.blunder_kind import BlunderKind
-from groundstation.survey.adjustment.hypotheses import FEWEST_TO_CREEP, Hypothesis
+from groundstation.survey.adjustment.hypotheses import Hypothesis
 from groundstation.survey.adjustment.looks import Looks
 from groundstation.survey.adjustment.reliability import Reliability
 from groundstation.survey.adjustment.run_of_stops import JOINT, RunOfStops
@@ -31,16 +31,8 @@ LARGEST: Final[Mapping[BlunderKind, float]] = {  # that is to be reckoned with w
 
 
 def possible_mistakes(looks: Looks, run: RunOfStops) -> list[Hypothesis]:
-    """What may go wrong at the last stop: with each tube that looked there, its joint, the encoder, the depth.
-
-    From three stops on the encoder may slip a little at every one, too.
-    """
-    return [*_of_last_stop(looks, run), *possible_drift(looks)]
-
-
-def possible_drift(looks: Looks) -> tuple[Hypothesis, ...]:
-    """An encoder that slips alike at every stop, where there are stops enough to tell that from a single slip."""
-    return (DRIFT,) if len(np.unique(looks.stop)) > FEWEST_TO_CREEP else ()
+    """What may go wrong at the last stop: with each tube that looked there, its joint, the encoder, the depth."""
+    return list(_of_last_stop(looks, run))
 
 
 def _of_last_stop(looks: Looks, run: RunOfStops) -> Iterator[Hypothesis]:
