@@ -16,7 +16,13 @@ from groundstation.survey.adjustment.blunder_kind import BlunderKind
 from groundstation.survey.adjustment.blunder_words import ADVICE, MISTAKES, advise_crew
 from groundstation.survey.adjustment.blunders import Blunder, Explanation, examine_hole
 from groundstation.survey.adjustment.hypotheses import Hypothesis, all_hypotheses
-from groundstation.survey.adjustment.least_found import LARGEST, possible_mistakes, unfound_across, worst_of_kinds
+from groundstation.survey.adjustment.least_found import (
+    DRIFT,
+    LARGEST,
+    possible_mistakes,
+    unfound_across,
+    worst_of_kinds,
+)
 from groundstation.survey.adjustment.looks import Looks
 from groundstation.survey.adjustment.reliability import measure_reliability
 from groundstation.survey.adjustment.toe_weights import leg_weights, toe_weights
@@ -87,7 +93,7 @@ def test_every_kind_has_its_advice_and_every_possible_mistake_its_name_and_size(
     drawn = draw_string(5)
     assert set(ADVICE) == set(BlunderKind)
     kinds = {one.kind for one in possible_mistakes(drawn.looks, drawn.run)}
-    assert kinds == set(MISTAKES) == set(LARGEST)
+    assert kinds | {DRIFT.kind} == set(MISTAKES) == set(LARGEST)  # a drift is of all stops
 
 
 def test_of_every_kind_a_crew_is_told_what_to_do_whatever_the_number_of_its_tubes() -> None:
