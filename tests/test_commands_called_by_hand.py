@@ -144,7 +144,7 @@ def test_a_calibration_that_cannot_be_written_names_the_file_that_was_asked_for(
     assert ended.value.message == f"{tmp_path}/kept: Is a directory; nothing was written"
     with pytest.raises(EnvironmentFault) as ended:
         calibration_output.write_files_whole({tmp_path / "one.pdf": b"1", tmp_path / "kept": b"2"})
-    assert ended.value.message == f"{tmp_path}/kept: Is a directory; of the files {tmp_path}/one.pdf was written"
+    assert ended.value.message == f"{tmp_path}/kept: Is a directory; already written: {tmp_path}/one.pdf"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["kept", "one.pdf"]
 
 

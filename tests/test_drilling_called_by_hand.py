@@ -265,8 +265,8 @@ def test_parts_are_compiled_by_one_process_and_each_line_is_one_function(monkeyp
         def __exit__(self, *_: object) -> None:
             done.append("waited for")
 
-        def kill(self) -> None:
-            done.append("killed")
+        def terminate(self) -> None:
+            done.append("ended")
 
     monkeypatch.setattr(compile_ahead.subprocess, "Popen", Running)
     counts: Given = []
@@ -278,7 +278,7 @@ def test_parts_are_compiled_by_one_process_and_each_line_is_one_function(monkeyp
 
     with pytest.raises(KeyboardInterrupt):
         compile_ahead.compile_parts(["step", "integers"], interrupt)
-    assert done[1:] == ["killed", "waited for"]
+    assert done[1:] == ["ended", "waited for"]
 
 
 def test_a_part_that_failed_is_not_marked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -298,10 +298,14 @@ def test_a_part_that_failed_is_not_marked(monkeypatch: pytest.MonkeyPatch, tmp_p
         def join(self) -> None:
             begun.append(f"{self.part} ends")
 
+        def kill(self) -> None:
+            begun.append(f"{self.part} is ended")
+
     monkeypatch.setattr(kernel_parts.multiprocessing, "get_context", lambda way: SimpleNamespace(Process=Process))
     kernel_parts.compile_beside(["surveys", "step", "integers"])
     assert [one.name for one in tmp_path.iterdir()] == ["step"]
-    assert begun == [f"{part} {what}" for what in ("starts", "ends") for part in ("surveys", "step", "integers")]
+    parts = ("surveys", "step", "integers")
+    assert begun == [f"{part} {what}" for what in ("starts", "ends", "is ended") for part in parts]
 
 
 def test_a_part_is_compiled_by_its_name_and_a_line_is_said_for_each(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -158,6 +158,7 @@ def test_an_early_compilation_says_of_how_many_and_compiles_what_is_lacking(
     compiled: list[object] = []
     monkeypatch.setattr(compile_ahead, "lacking_parts", {"float64": lacking}.__getitem__)
     monkeypatch.setattr(kernel_parts, "compile_beside", compiled.append)
+    monkeypatch.setattr(kernel_parts, "end_when_told", lambda: None)  # of this process
     runpy.run_path(compile_early.__file__, run_name="__main__")
     assert capsys.readouterr().out == said
     assert compiled == [lacking] * bool(lacking)

@@ -1,6 +1,8 @@
 """Parts of a rig's kernels: forked off one compiler, and of an adjustment the loops kept."""
 
+import contextlib
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -22,6 +24,18 @@ def fail():
     raise SystemExit(3)
 
 kernel_parts.PARTS = {"one": look, "other": look, "failing": fail}
+kernel_parts.compile_beside(list(kernel_parts.PARTS))
+"""
+WAITING = """
+import time
+from borechain.drilling import kernel_parts
+
+def wait():
+    kernel_parts.say_one()
+    time.sleep(3600.0)
+
+kernel_parts.end_when_told()
+kernel_parts.PARTS = {"one": wait, "other": wait}
 kernel_parts.compile_beside(list(kernel_parts.PARTS))
 """
 LOOPS = r"""
@@ -66,3 +80,21 @@ def test_loops_that_are_kept_are_less_code_for_the_same_numbers(tmp_path: Path) 
     (short, kept), (long, usual) = (run(tmp_path, "-c", LOOPS, how).stdout.split() for how in ("kept", "usual"))
     assert kept == usual
     assert 3 * int(short) <= 2 * int(long)
+
+
+def test_who_is_told_to_end_leaves_no_part_behind(tmp_path: Path) -> None:
+    """Parts hold the output open as long as they live."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-c", WAITING]
+    with subprocess.Popen(
+        command, cwd=REPOSITORY, env=environment, stdout=subprocess.PIPE, start_new_session=True
+    ) as running:
+        try:
+            assert running.stdout is not None
+            assert [running.stdout.readline() for _ in range(2)] == [b".\n"] * 2
+            running.terminate()
+            assert running.communicate(timeout=30.0)[0] == b""
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(running.pid, signal.SIGKILL)
+    assert running.returncode == 128 + signal.SIGTERM

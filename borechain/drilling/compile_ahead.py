@@ -72,5 +72,5 @@ def compile_parts(parts: Sequence[str], tell: Callable[[int], None]) -> None:
             for done, _ in enumerate(running.stdout or (), 1):
                 tell(done)
         except BaseException:
-            running.kill()  # what it has forked ends as it writes its next line
+            running.terminate()  # it ends what it has forked
             raise

@@ -9,9 +9,10 @@ from __future__ import annotations
 import sys
 
 from borechain.drilling.compile_ahead import count_about, lacking_parts
-from borechain.drilling.kernel_parts import compile_beside
+from borechain.drilling.kernel_parts import compile_beside, end_when_told
 
 if __name__ == "__main__":
+    end_when_told()
     lacking = lacking_parts("float64")
     if lacking:
         sys.stdout.write(f"{count_about(lacking)}\n")

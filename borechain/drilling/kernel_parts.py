@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import gc
 import multiprocessing
+import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
@@ -93,16 +94,20 @@ PARTS: Final[Mapping[str, Callable[[], None]]] = {
 
 
 def compile_beside(parts: Sequence[str]) -> None:
-    """Compile parts beside each other, and mark those that succeeded."""
+    """Compile parts beside each other, and mark those that succeeded; none outlives this call."""
     load_compiler()
     fork = multiprocessing.get_context("fork")
     running = [fork.Process(target=compile_part, args=(part,)) for part in parts]
     for process in running:
         process.start()
-    for part, process in zip(parts, running, strict=True):
-        process.join()
-        if process.exitcode == 0:
-            mark_of(part).touch()
+    try:
+        for part, process in zip(parts, running, strict=True):
+            process.join()
+            if process.exitcode == 0:
+                mark_of(part).touch()
+    finally:
+        for process in running:
+            process.kill()
 
 
 def load_compiler() -> None:
@@ -128,5 +133,11 @@ def say_one() -> None:
     sys.stdout.flush()
 
 
+def end_when_told() -> None:
+    """Have SIGTERM end this process as any exit does, and not at once: what it has forked ends with it."""
+    signal.signal(signal.SIGTERM, lambda number, _frame: sys.exit(128 + number))
+
+
 if __name__ == "__main__":
+    end_when_told()
     compile_beside(sys.argv[1:])

@@ -1,7 +1,6 @@
 """Calibration in the field: the order of steps, what is asked again, refusals, restarts, on a string in memory."""
 
 import json
-import math
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +13,13 @@ from groundstation.calibration.attitudes import true_vectors
 from groundstation.calibration.block import read_calibration
 from groundstation.errors import SelectorError
 from groundstation.service.answers.answer_table import ANSWERS
-from groundstation.service.orders.recalibration.procedure import FieldProcedure, Request
+from groundstation.service.orders.recalibration.procedure import FieldProcedure
 from groundstation.service.orders.recalibration.recalibration_progress import (
     RecalibrationProgress,
     RecalibrationStage,
     TubePhase,
 )
-from node.kernels.arithmetic.formats import DEG
-from telemetry.messages import BASE, BlockSegment, Reply, StaticRecord
+from telemetry.messages import BASE, BlockSegment
 from telemetry.parameters import ParameterBlock, SensorParameters
 
 pytestmark = pytest.mark.slow  # strings in memory, a second each
@@ -393,31 +391,3 @@ def test_progress_comes_back_from_its_text(rig: Field) -> None:
     assert RecalibrationProgress.from_json(progress.to_json()) == progress
     assert (progress.stage, progress.tubes[1].phase) == (RecalibrationStage.SOLVED, TubePhase.PROPOSED)
     assert rig.ground.store.progress() == progress.to_json()
-
-
-def record(command: int, ended_at: float) -> StaticRecord:
-    cov = ((1e-5, 0.0, 0.0), (0.0, 1e-5, 0.0), (0.0, 0.0, 1e-5))
-    force = (0.0, 0.0, -9.81)
-    return StaticRecord(1, 1, command, ended_at - 8.0, ended_at, 15, (0.0, 0.0, 0.0), cov, force, cov, 25.0, False)
-
-
-def test_records_are_matched_by_the_command_that_asked_for_them() -> None:
-    procedure = FieldProcedure(9.81)
-    procedure.begin([1])
-    (question,) = procedure.due_requests(0.0)
-    assert question == Request(1, "parameters", {})
-    procedure.on_sent(question, 41)
-    procedure.on_reply(Reply(1, 41, True, "", {"version": 0, "sha256": ParameterBlock(1, 0).sha256().hex()}), 1.0)
-    procedure.attitude(0.0, 90.0 * DEG, 8.0, 100.0)
-    (ask,) = procedure.due_requests(1.0)
-    assert (ask.name, ask.arguments) == ("static_record", {"seconds": 8.0})
-    procedure.on_sent(ask, 42)
-    assert procedure.due_requests(10.0) == []
-    procedure.on_static_record(record(7, 110.0))  # an operator's own
-    assert procedure.count_records(procedure.progress.tubes[1]) == 0
-    assert [a.name for a in procedure.due_requests(1.0 + 8.0 + 15.0)] == ["static_record"]  # nothing came: once more
-    procedure.on_static_record(record(42, 90.0))  # of a tube that does not know rig time yet
-    assert procedure.count_records(procedure.progress.tubes[1]) == 0
-    procedure.on_static_record(record(42, 110.0))
-    assert procedure.count_records(procedure.progress.tubes[1]) == 1
-    assert procedure.due_requests(math.inf) == []

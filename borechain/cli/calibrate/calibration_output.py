@@ -144,19 +144,19 @@ def write_files_whole(files: dict[Path, bytes]) -> None:
     """Write drafts of all files and rename them only when every one is on the disk."""
     drafts = {path: path.with_name(f".{path.name}.{os.getpid()}.draft") for path in files}
     landed: list[str] = []
-    for_whom = Path()
+    path = Path()
     try:
-        for for_whom, content in files.items():
-            with drafts[for_whom].open("wb") as file:
+        for path, content in files.items():
+            with drafts[path].open("wb") as file:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
-        for for_whom, draft in drafts.items():
-            draft.replace(for_whom)
-            landed.append(str(for_whom))
+        for path, draft in drafts.items():
+            draft.replace(path)
+            landed.append(str(path))
     except OSError as error:
-        told = f"of the files {', '.join(landed)} was written" if landed else "nothing was written"
-        raise EnvironmentFault(f"{for_whom}: {error.strerror}; {told}") from error
+        told = f"already written: {', '.join(landed)}" if landed else "nothing was written"
+        raise EnvironmentFault(f"{path}: {error.strerror}; {told}") from error
     finally:
         for draft in drafts.values():
             with contextlib.suppress(OSError):

@@ -30,6 +30,14 @@ SURE = 0.95  # chance of ending within, from which on it is on target; a correct
 EVEN = 0.5  # chance below which it is more likely out than in
 SURELY = 2.0  # standard deviations
 WORTH_TELLING = 0.1  # of the limit
+LOOK_ALONE = (  # cm
+    "one tube alone has read the last station: were it wrong there, the toe would be up to {:.1f} cm off; "
+    "the next survey shows it, or one with the string lifted by a tube"
+)
+BELT_SLIPS = (  # cm
+    "a belt of the encoder that slips a little at every stop, too little to be found, would have the toe up to "
+    "{:.1f} cm off: hold the encoder against the mark on the drive head"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,31 +143,17 @@ def judge_surveys(known: Known) -> HoleVerdict:
         return HoleVerdict(Word.WATCH, Word.WATCH, (why,), (), "deviation", worst, is_at_end=known.is_at_end)
     deadline = None if known.is_at_end or end.within >= SURE else correction_deadline(end, known)
     word, why = _word_of(end, deadline, known.stop)
-    reasons = (why, *_say_look_alone(end, known), *_say_drift(end, known))
+    reasons = (why, *_say_unfound(end, known))
     beside = max(known.unfound, known.drift)  # two mistakes at once that nothing shows are not reckoned with
     if word is Word.ON_TARGET and known.is_at_end and math.hypot(*end.ends.offset) + beside > end.limit:
         word = Word.WATCH
     return HoleVerdict(word, word, reasons, (), "projection", end.ends, end, deadline, known.is_at_end)
 
 
-def _say_look_alone(end: ProjectedEnd, known: Known) -> tuple[str, ...]:
-    """What a mistake of the one tube that has read the last station may do, where that is a good part of the limit."""
-    if known.unfound < WORTH_TELLING * end.limit:
-        return ()
-    return (
-        f"one tube alone has read the last station: were it wrong there, the toe would be up to "
-        f"{100.0 * known.unfound:.1f} cm off; the next survey shows it, or one with the string lifted by a tube",
-    )
-
-
-def _say_drift(end: ProjectedEnd, known: Known) -> tuple[str, ...]:
-    """What an encoder that slips at every stop may do, where that is a good part of the limit."""
-    if known.drift < WORTH_TELLING * end.limit:
-        return ()
-    return (
-        f"a belt of the encoder that slips a little at every stop, too little to be found, would have the toe up to "
-        f"{100.0 * known.drift:.1f} cm off: hold the encoder against the mark on the drive head",
-    )
+def _say_unfound(end: ProjectedEnd, known: Known) -> tuple[str, ...]:
+    """What mistakes that no reading shows may do at the toe, each where that is a good part of the limit."""
+    told = ((known.unfound, LOOK_ALONE), (known.drift, BELT_SLIPS))
+    return tuple(words.format(100.0 * size) for size, words in told if size >= WORTH_TELLING * end.limit)
 
 
 def _word_of(end: ProjectedEnd, deadline: Deadline | None, stop: float) -> tuple[Word, str]:

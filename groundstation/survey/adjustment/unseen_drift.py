@@ -17,11 +17,12 @@ import numpy.typing as npt
 from groundstation.survey.adjustment.adjusted import Adjusted
 from groundstation.survey.adjustment.hypotheses import FEWEST_TO_CREEP, turns_of_drift
 from groundstation.survey.adjustment.least_found import DRIFT, LARGEST
+from groundstation.survey.adjustment.looks import TURN
 from groundstation.survey.adjustment.reliability import Reliability, least_noncentrality
 from groundstation.survey.adjustment.scores import UNTOLD, pulled_unknowns
 
 Array = npt.NDArray[np.float64]
-TURNED = 7  # column of a look's change by the turn of its tube
+TURNED = 2 + TURN  # column of a look's change by the turn of its tube: two of its station come before the tube's
 
 
 @dataclass(frozen=True, slots=True)
